@@ -24,7 +24,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name 
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo check test test-rust test-python test-long lint stubs wheel bench format lock audit licences clean
+.PHONY: help setup demo check test test-rust test-python test-long lint size stubs wheel bench format lock audit licences clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -72,6 +72,9 @@ lint: setup stubs ## formatting, style and types of both languages
 	$(BIN)/mypy
 	cargo fmt --all --check
 	cargo clippy --locked --release --workspace --all-targets --quiet -- -D warnings
+
+size: $(STAMPS)/packages ## code lines of the Python package, and public signatures with Any
+	$(BIN)/python tools/size.py
 
 stubs: $(STAMPS)/extension ## the hand-written stub against the built extension
 	cd $(STAMPS) && ../$(BIN)/python -m mypy.stubtest elevon._core

@@ -1,9 +1,10 @@
 """Time this checkout against another one, both in one run: ``against.py OTHER [--json]``.
 
-OTHER is a checkout of the project whose extension is built (``make build`` there). Each of the two
-runs its own ``run.py`` functions in a process of its own, one after the other within a round, so
-that a machine that slows down slows both; the C yardsticks run in each round as well. A figure is
-the best of the rounds, a ratio one of the bests.
+OTHER is a checkout of the project whose extension is built (``make setup`` there). The packages of
+both run the ``run.py`` functions of this checkout, each in a process of its own, one after the
+other within a round, so that a machine that slows down slows both; the C yardsticks run in each
+round as well. A figure is the best of the rounds, a ratio one of the bests; costs are nanoseconds
+for each microsecond simulated, a step of the C march.
 """
 
 from __future__ import annotations
@@ -20,13 +21,24 @@ from typing import Any
 
 HERE = Path(__file__).resolve().parent
 FIGURES = {
-    "single": ("ns/step", "run.high(False)['call']"),
-    "full": ("ns/step", "run.high(True)['call']"),
-    "batch": ("ns/lane step", "run.batch(False)"),
-    "batch_full": ("ns/lane step", "run.batch(True)"),
-    "low": ("x real time", "run.low()"),
-    "low_batch": ("x real time", "run.low_batch()"),
-    "thousand": ("s", "run.thousand()['seconds']"),
+    "single": ("ns/us", "run.high()['call']", "c"),
+    "batch": ("ns/us", "run.batch()", "c_batch"),
+    "full": ("ns/us", "run.high('full')['call']", "c"),
+    "batch_full": ("ns/us", "run.batch('full')", "c_batch"),
+    "carrier, 1 us": ("ns/us", "run.high('carrier')['call']", "c"),
+    "carrier, 1 us, batch": ("ns/us", "run.batch('carrier')", "c_batch"),
+    "carrier, 12.5 us": ("ns/us", "run.high('carrier', 12.5e-6)['call']", "c"),
+    "carrier, 12.5 us, batch": ("ns/us", "run.batch('carrier', 12.5e-6)", "c_batch"),
+    "located, 1 us": ("ns/us", "run.high('located')['call']", "c"),
+    "located, 4 us": ("ns/us", "run.high('located', 4e-6)['call']", "c"),
+    "located, 4 us, batch": ("ns/us", "run.batch('located', 4e-6)", "c_batch"),
+    "thermal": ("ns/us", "run.high('thermal')['call']", "c"),
+    "dead time": ("ns/us", "run.high('dead_time')['call']", "c"),
+    "lugre": ("ns/us", "run.high('lugre')['call']", "c"),
+    "lugre, batch": ("ns/us", "run.batch('lugre')", "c_batch"),
+    "low": ("x real time", "run.low()", ""),
+    "low_batch": ("x real time", "run.low_batch()", ""),
+    "thousand": ("s", "run.thousand()['seconds']", ""),
 }
 #: Lanes of the C programs.
 YARDSTICKS = {"c": 1, "c_batch": 64}
@@ -48,7 +60,7 @@ class Checkout:
     def __init__(self, root: Path, clock: str) -> None:
         paths = [str(root / "python"), os.environ.get("PYTHONPATH", "")]
         self.process = subprocess.Popen(
-            [sys.executable, "-c", WORKER, str(root / "benchmarks"), clock],
+            [sys.executable, "-c", WORKER, str(HERE), clock],
             env={
                 **os.environ,
                 "PYTHONPATH": os.pathsep.join(paths),
@@ -101,21 +113,15 @@ def rounds(other: Path, names: list[str], count: int, clock: str) -> dict[str, d
             print(f"round {index + 1} of {count}", file=sys.stderr)
     table: dict[str, dict[str, Any]] = {}
     for name in names:
-        unit = FIGURES[name][0]
+        unit, _, stick = FIGURES[name]
         best = {side: better(unit, values) for side, values in kept[name].items()}
         table[name] = {"unit": unit, **best, "ratio": best["after"] / best["before"]}
-    for name, stick in (
-        ("single", "c"),
-        ("full", "c"),
-        ("batch", "c_batch"),
-        ("batch_full", "c_batch"),
-    ):
-        if name in table:
+        if stick:
             least = min(c[stick])
             table[name] |= {
                 "c": least,
-                "before_c": table[name]["before"] / least,
-                "after_c": table[name]["after"] / least,
+                "before_c": best["before"] / least,
+                "after_c": best["after"] / least,
             }
     return table
 
@@ -138,13 +144,13 @@ def main() -> int:
     parser.add_argument("other", type=Path, help="checkout to compare with, its extension built")
     parser.add_argument("--json", action="store_true", help="one JSON object on stdout")
     parser.add_argument("--rounds", type=int, default=7, help="interleaved repetitions (7)")
-    parser.add_argument("--figures", default=",".join(FIGURES), help="which, separated by commas")
+    parser.add_argument("--figures", default=";".join(FIGURES), help="which, separated by ;")
     parser.add_argument(
         "--cpu", action="store_true", help="CPU time instead of wall time: where others work, too"
     )
     given = parser.parse_args()
     sys.path.insert(0, str(HERE))
-    names = [name for name in given.figures.split(",") if not (given.cpu and name == "thousand")]
+    names = [name for name in given.figures.split(";") if not (given.cpu and name == "thousand")]
     clock = "cpu" if given.cpu else "wall"
     table = rounds(given.other.resolve(), names, given.rounds, clock)
     if given.json:

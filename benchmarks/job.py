@@ -95,6 +95,32 @@ FULL: dict[str, Any] = {
     "sensor.current.bits": 12,
     "sensor.resolver.mismatch": 0.01,
 }
+# The same loop behind a carrier; the current PI cancels the winding's pole.
+TAU = 1 / (2 * math.pi * 200.0)
+CARRIER: dict[str, Any] = {
+    "drive.kind": "pwm",
+    "control.sample_time": 125e-6,
+    "pwm.frequency": 4000.0,
+    "pwm.sample_time": 125e-6,
+    "pwm.proportional_gain": 30.5e-3 / TAU,
+    "pwm.integral_gain": 2.75 / TAU,
+    "pwm.inductance": 30.5e-3,
+    "pwm.emf_constant": KT / 1.5,
+}
+#: What a variant of the job sets beside the common values.
+VARIANTS: dict[str, dict[str, Any]] = {
+    "common": {},
+    "full": FULL,
+    "carrier": CARRIER,
+    "located": {"inverter.relay_crossing": "located"},
+    "thermal": {"thermal.model": "dynamic", "motor.temperature_coefficient": 3.93e-3},
+    "dead_time": {
+        "inverter.dead_time": 2e-6,
+        "inverter.on_resistance": 0.1,
+        "inverter.diode_drop": 1.0,
+    },
+    "lugre": {"friction.law": "lugre"},
+}
 RECORD = [
     "output_position,motor_position,motor_speed,current_a,current_b,current_c,motor_torque@400 Hz"
 ]
@@ -104,18 +130,21 @@ FULL_LOAD: dict[str, Any] = {
 }
 
 
-def actuator(full: bool = False) -> Any:
-    """The loop of benchmark_job.c; with `full`, every option of the high model switched on."""
-    return elevon.Actuator.load("torino-rotary").with_values(COMMON | (FULL if full else {}))
+def actuator(variant: str = "common", step: float = 1e-6) -> Any:
+    """The loop of benchmark_job.c, or a variant of it, at a step of its own."""
+    values = COMMON | VARIANTS[variant] | {"solver.step": step}
+    if values["drive.kind"] == "pwm":
+        del values["inverter.hysteresis_band"]
+    return elevon.Actuator.load("torino-rotary").with_values(values)
 
 
 def scenario(
     duration: float,
     amplitude_deg: float = 7.0,
     faults: list[dict[str, Any]] | None = None,
-    full: bool = False,
+    variant: str = "common",
 ) -> Any:
-    """Sine of 0.2 Hz from rest; with `full`, loads on both shafts as well."""
+    """Sine of 0.2 Hz from rest; with every option, loads on both shafts as well."""
     return elevon.Scenario.from_dict(
         {
             "duration": duration,
@@ -126,6 +155,6 @@ def scenario(
                 ],
             },
             "fault": faults or [],
-            "load": FULL_LOAD if full else {},
+            "load": FULL_LOAD if variant == "full" else {},
         }
     )

@@ -11,7 +11,7 @@ import time
 from elevon.actuator import Actuator
 from elevon.prognose import Inspection, ParticleFilter, Process, Seen, respond
 from elevon.prognose.predict import prognosis
-from elevon.reproduce.prognosis.campaign import campaign_mission
+from studies.prognosis.campaign import campaign_mission
 
 SEVERITIES = {"backlash@transmission": 2e-6, "friction@transmission": 1.5e-4}
 

@@ -29,7 +29,7 @@ import elevon
 from elevon import _core
 
 STEPS = 1_000_000
-LANE_STEPS = STEPS  # the common job's second in every lane
+SECONDS = STEPS * 1e-6  # the common job's second, in every lane
 LANES = 64
 LOW_SECONDS = 500.0
 LOW_BATCH_SECONDS = 100.0
@@ -42,23 +42,25 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - start, result
 
 
-def high(full: bool) -> dict[str, float]:
-    """One run of the common job through the public call: all of it, and the integration alone."""
-    model, scene = job.actuator(full), job.scenario(STEPS * 1e-6, full=full)
+def high(variant: str = "common", step: float = 1e-6) -> dict[str, float]:
+    """A second of a variant of the job by the public call, in ns per microsecond simulated.
+
+    All of it, and the integration alone.
+    """
+    model, scene = job.actuator(variant, step), job.scenario(SECONDS, variant=variant)
     wall, rec = timed(lambda: elevon.simulate(model, scene, record=job.RECORD))
-    steps = rec.meta["steps"]
-    return {"call": wall / steps * 1e9, "core": rec.meta["wall_s"] / steps * 1e9}
+    return {"call": wall / STEPS * 1e9, "core": rec.meta["wall_s"] / STEPS * 1e9}
 
 
-def batch(full: bool) -> float:
-    """64 runs side by side on one thread, ns per run and step."""
-    model = job.actuator(full)
+def batch(variant: str = "common", step: float = 1e-6) -> float:
+    """64 runs side by side on one thread, ns per run and microsecond."""
+    model = job.actuator(variant, step)
     runs = [
-        elevon.Run(model, job.scenario(LANE_STEPS * 1e-6, 7.0 + 0.05 * i, full=full), i, str(i))
+        elevon.Run(model, job.scenario(SECONDS, 7.0 + 0.05 * i, variant=variant), i, str(i))
         for i in range(LANES)
     ]
-    wall, recs = timed(lambda: elevon.simulate_batch(runs, record=job.RECORD, threads=1))
-    return wall / sum(rec.meta["steps"] for rec in recs) * 1e9
+    wall, _ = timed(lambda: elevon.simulate_batch(runs, record=job.RECORD, threads=1))
+    return wall / STEPS / LANES * 1e9
 
 
 def low() -> float:
@@ -108,16 +110,16 @@ def rounds(sticks: dict[str, yardsticks.Yardstick], count: int) -> list[dict[str
     """`count` interleaved rounds of every contestant, after one uncounted warm-up."""
     found = []
     for index in range(count + 1):
-        single, full = high(False), high(True)
+        single, full = high(), high("full")
         figures = {
             "c_ns_per_step": sticks["c"].run(STEPS)["ns_per_step"],
             "high_ns_per_step": single["call"],
             "high_core_ns_per_step": single["core"],
             "c_poly_ns_per_step": sticks["c_poly"].run(STEPS)["ns_per_step"],
             "high_full_ns_per_step": full["call"],
-            "c_batch_ns_per_lane_step": sticks["c_batch"].run(LANE_STEPS)["ns_per_lane_step"],
-            "batch_ns_per_lane_step": batch(False),
-            "batch_full_ns_per_lane_step": batch(True),
+            "c_batch_ns_per_lane_step": sticks["c_batch"].run(STEPS)["ns_per_lane_step"],
+            "batch_ns_per_lane_step": batch(),
+            "batch_full_ns_per_lane_step": batch("full"),
             "low_realtime_factor": low(),
             "low_batch_realtime_factor": low_batch(),
         }

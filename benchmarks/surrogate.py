@@ -24,9 +24,9 @@ from elevon import Actuator  # after the number of threads is set: NumPy reads i
 from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import setups
 from elevon.bench.traces import recorded
+from elevon.bench.virtual import first_trace, traced
 from elevon.diagnose.surrogate import diagnose_by_surrogate
 from elevon.diagnose.surrogate.features import log_features
-from elevon.diagnose.virtual import first_trace, traced
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
 

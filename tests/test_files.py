@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from elevon.errors import OutputError, OutputExistsError
-from elevon.files import atomic_path, check_output, write_bytes, write_text
+from elevon.errors import InputError, OutputError, OutputExistsError
+from elevon.files import atomic_path, check_output, visible, write_bytes, write_text
 
 
 def _names(folder):
@@ -64,6 +64,25 @@ def test_a_failing_writer_leaves_the_old_file(tmp_path):
         raise RuntimeError
     assert path.read_text() == "old"
     assert _names(tmp_path) == ["a.txt"]
+
+
+def test_what_a_killed_writer_left_is_not_read_as_a_file_of_its_folder(tmp_path, monkeypatch):
+    from elevon.parameters.find import VARIABLE, set_names
+    from elevon.prognose.history import read_history
+    from elevon.report import Report
+
+    Report("other").save(tmp_path / "a.html")
+    for ending in ("html", "json", "toml"):
+        (tmp_path / f".a.0123456789ab.part.{ending}").write_text((tmp_path / "a.html").read_text())
+    assert visible(tmp_path, "*") == [tmp_path / "a.html"]
+    page = Report("page")
+    page.save(tmp_path / "page.html")
+    assert list(page.beside) == ["a.html"]
+    with pytest.raises(InputError, match="no inspections"):
+        read_history(tmp_path, unit="h")
+    names = set_names()
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    assert set_names() == names
 
 
 def test_a_link_to_nowhere_counts_as_existing(tmp_path):

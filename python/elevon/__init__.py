@@ -4,6 +4,7 @@ The package imports nothing heavy by itself: every public name is looked up when
 
 >>> import elevon
 >>> actuator = elevon.Actuator.load("torino-rotary")  # doctest: +SKIP
+>>> elevon.diagnose("log.csv", actuator, baselines="healthy.csv")  # doctest: +SKIP
 """
 
 import sys
@@ -14,14 +15,28 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from elevon.actuator import Actuator as Actuator
     from elevon.actuator import list_actuators as list_actuators
+    from elevon.calibrate.door import calibrate as calibrate
+    from elevon.calibrate.door import validate as validate
     from elevon.campaign import load_campaign as load_campaign
+    from elevon.diagnose.door import diagnose as diagnose
+    from elevon.diagnose.door import monitor as monitor
+    from elevon.doors import bench as bench
+    from elevon.doors import compare as compare
+    from elevon.doors import effects as effects
+    from elevon.doors import response as response
     from elevon.errors import ElevonError as ElevonError
     from elevon.errors import ElevonWarning as ElevonWarning
     from elevon.errors import InputError as InputError
     from elevon.errors import NotActingWarning as NotActingWarning
+    from elevon.logs.read import read_log as read_log
+    from elevon.nexttest.door import next_test as next_test
+    from elevon.prognose.door import fleet as fleet
+    from elevon.prognose.door import predict as predict
     from elevon.recording import Channel as Channel
     from elevon.recording import Clock as Clock
     from elevon.recording import Recording as Recording
+    from elevon.results import Result as Result
+    from elevon.results import load as load
     from elevon.scenario import Scenario as Scenario
     from elevon.session import Session as Session
     from elevon.simulate import Run as Run
@@ -29,6 +44,18 @@ if TYPE_CHECKING:
     from elevon.simulate import simulate_batch as simulate_batch
 
 _PUBLIC = {
+    "bench": "elevon.doors",
+    "calibrate": "elevon.calibrate.door",
+    "compare": "elevon.doors",
+    "diagnose": "elevon.diagnose.door",
+    "effects": "elevon.doors",
+    "fleet": "elevon.prognose.door",
+    "monitor": "elevon.diagnose.door",
+    "next_test": "elevon.nexttest.door",
+    "predict": "elevon.prognose.door",
+    "read_log": "elevon.logs.read",
+    "response": "elevon.doors",
+    "validate": "elevon.calibrate.door",
     "Actuator": "elevon.actuator",
     "Channel": "elevon.recording",
     "Clock": "elevon.recording",
@@ -37,9 +64,11 @@ _PUBLIC = {
     "InputError": "elevon.errors",
     "NotActingWarning": "elevon.errors",
     "Recording": "elevon.recording",
+    "Result": "elevon.results",
     "Run": "elevon.simulate",
     "Scenario": "elevon.scenario",
     "list_actuators": "elevon.actuator",
+    "load": "elevon.results",
     "load_campaign": "elevon.campaign",
     "Session": "elevon.session",
     "simulate": "elevon.simulate",

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from elevon.parameters import ParameterSet, load_set, set_names
+from elevon.plain import Plain
 
 __all__ = ["Actuator", "list_actuators"]
 
 
 @dataclass(frozen=True)
-class Actuator:
+class Actuator(Plain):
     """An electromechanical actuator, as an immutable value.
 
     Attributes

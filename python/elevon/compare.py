@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, RangeError, SimulationError
+from elevon.plain import STORED, in_unit, key
+from elevon.results import Result
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -43,7 +45,7 @@ CUTOFF_HZ = 10.0
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Result):
     """Two runs of one scenario, filtered alike, on one time base.
 
     Attributes
@@ -56,20 +58,56 @@ class Comparison:
         Position, speed and q_current: the signal compared.
     amplitude : float
         Half the range of the switching model's position, its normaliser [rad or m].
-    recordings : (Recording, Recording)
-        High and low, as recorded.
     start, cutoff : float
         What came before is left out [s]; cut-off of the filter [Hz].
+    actuator : str
+        Its name.
+    unit : str
+        Of the position.
+    high_wall_s, low_wall_s, sim_s : float
+        Wall time of each run, integration alone, and simulated time [s].
+    faults : tuple of str
+        In both.
+    parameter_hash, seed : str, int
+        Of both.
+    loads : mapping of str to Comparison
+        The same under load, where that was requested.
     """
 
-    time: Array
-    high: Mapping[str, Array]
-    low: Mapping[str, Array]
+    time: Annotated[Array, STORED]
+    high: Annotated[Mapping[str, Array], STORED]
+    low: Annotated[Mapping[str, Array], STORED]
     signals: Mapping[str, str]
-    amplitude: float
-    recordings: tuple[Recording, Recording]
-    start: float
-    cutoff: float
+    amplitude: Annotated[float, STORED]
+    start: Annotated[float, key("start_s"), in_unit("s")]
+    cutoff: Annotated[float, STORED, in_unit("Hz")]
+    actuator: str
+    unit: Annotated[str, STORED]
+    high_wall_s: Annotated[float, in_unit("s")] = field(compare=False)
+    low_wall_s: Annotated[float, in_unit("s")] = field(compare=False)
+    sim_s: Annotated[float, STORED]
+    faults: tuple[str, ...]
+    parameter_hash: str
+    seed: int
+    loads: Mapping[str, Comparison] = field(default_factory=dict)
+
+    KIND: ClassVar = "comparison"
+    COMPUTED: ClassVar = (
+        "status", "position_nrmse", "speed_nrmse", "q_current_nrmse", "speed_up", "filter",
+        "high_realtime_factor", "low_realtime_factor",
+    )  # fmt: skip
+    status: ClassVar = "ok"
+
+    def to_dict(self, *, stored: bool = True) -> dict[str, Any]:
+        """Return the JSON form, beside it the errors by their units."""
+        position, speed, current = (self.signals[part] for part in ROLES)
+        return super().to_dict(stored=stored) | {
+            f"position_rms_error_{self.unit}": self.rms_error(position),
+            "speed_rms_error_rad_per_s": self.rms_error(speed),
+            "q_current_rms_error_a": self.rms_error(current),
+            "q_current_rms_a": _rms(self.high[current]),
+            f"amplitude_{self.unit}": self.amplitude,
+        }
 
     def rms_error(self, signal: str) -> float:
         """Return the RMS of the two models' difference, in the signal's own unit."""
@@ -95,37 +133,30 @@ class Comparison:
     @property
     def speed_up(self) -> float:
         """Wall time of the switching model over the reduced-order one's, integration alone."""
-        high, low = (float(recording.meta["wall_s"]) for recording in self.recordings)
-        return high / low if low > 0.0 else float("inf")
+        return _over(self.high_wall_s, self.low_wall_s)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        high, low = self.recordings
-        position, speed, current = (self.signals[part] for part in ROLES)
-        unit = high[position].unit
-        return {
-            "status": "ok",
-            "actuator": high.meta["actuator"],
-            "position_nrmse": self.position_nrmse,
-            "speed_nrmse": self.speed_nrmse,
-            "q_current_nrmse": self.q_current_nrmse,
-            "speed_up": self.speed_up,
-            f"position_rms_error_{unit}": self.rms_error(position),
-            "speed_rms_error_rad_per_s": self.rms_error(speed),
-            "q_current_rms_error_a": self.rms_error(current),
-            "q_current_rms_a": _rms(self.high[current]),
-            f"amplitude_{unit}": self.amplitude,
-            "signals": dict(self.signals),
-            "start_s": self.start,
-            "filter": f"Butterworth, 2nd order, {self.cutoff:g} Hz, forwards and backwards",
-            "high_wall_s": float(high.meta["wall_s"]),
-            "low_wall_s": float(low.meta["wall_s"]),
-            "high_realtime_factor": _realtime(high),
-            "low_realtime_factor": _realtime(low),
-            "faults": list(high.meta["faults"]),
-            "parameter_hash": high.meta["parameter_hash"],
-            "seed": high.meta["seed"],
-        }
+    @property
+    def high_realtime_factor(self) -> float:
+        """Simulated time over wall time of the switching model."""
+        return _over(self.sim_s, self.high_wall_s)
+
+    @property
+    def low_realtime_factor(self) -> float:
+        """Simulated time over wall time of the reduced-order model."""
+        return _over(self.sim_s, self.low_wall_s)
+
+    @property
+    def filter(self) -> str:
+        """Through which both went, in words."""
+        return f"Butterworth, 2nd order, {self.cutoff:g} Hz, forwards and backwards"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return (
+            f"{self.actuator}: the reduced-order model is {100 * self.position_nrmse:.3g} % of the "
+            f"amplitude from the switching one, {self.speed_up:.0f} times as fast."
+        )
 
 
 def default_scenario(actuator: Actuator) -> Scenario:
@@ -225,7 +256,17 @@ def compare(
     amplitude = float(np.ptp(signals[0][names["position"]])) / 2.0
     if amplitude == 0.0:
         raise InputError(f"compare: nothing moves after {start:g} s, there is no amplitude")
-    return Comparison(grid, signals[0], signals[1], names, amplitude, (high, low), start, cutoff)
+    return Comparison(
+        grid, signals[0], signals[1], names, amplitude, start, cutoff,
+        actuator=str(high.meta["actuator"]),
+        unit=high[names["position"]].unit,
+        high_wall_s=float(high.meta["wall_s"]),
+        low_wall_s=float(low.meta["wall_s"]),
+        sim_s=float(high.meta["sim_s"]),
+        faults=tuple(high.meta["faults"]),
+        parameter_hash=str(high.meta["parameter_hash"]),
+        seed=int(high.meta["seed"]),
+    )  # fmt: skip
 
 
 def compared_signals(wiring: str) -> dict[str, str]:
@@ -297,6 +338,5 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _realtime(recording: Recording) -> float:
-    wall = float(recording.meta["wall_s"])
-    return float(recording.meta["sim_s"]) / wall if wall > 0.0 else float("inf")
+def _over(time: float, wall: float) -> float:
+    return time / wall if wall > 0.0 else float("inf")

@@ -95,8 +95,10 @@ def read_toml(path: str | Path) -> Document:
         raise FormatError(f"{file}: is not UTF-8 text: {error}") from error
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, ValueError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise FormatError(f"{file}: not valid TOML: {error}") from error
+    except ValueError as error:  # Python's own limit
+        raise FormatError(f"{file}: a whole number has more than 4300 digits") from error
     except RecursionError as error:
         raise FormatError(f"{file}: {_TOO_DEEP}") from error
     check_depth(data, str(file))
@@ -108,7 +110,7 @@ _DEEPEST = 32
 _TOO_DEEP = f"tables and lists are nested deeper than {_DEEPEST} levels"
 
 
-def check_depth(data: Any, place: str) -> None:
+def check_depth(data: object, place: str) -> None:
     """Raise `FormatError` where tables and lists are nested deeper than any file of ours needs."""
     if _depth(data) > _DEEPEST:
         raise FormatError(f"{place}: {_TOO_DEEP}")

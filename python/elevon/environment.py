@@ -71,8 +71,8 @@ class ActuatorEnv(gymnasium.Env[Floats, Floats]):
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), np.float64)
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Floats, dict[str, Any]]:
+        self, *, seed: int | None = None, options: dict[str, object] | None = None
+    ) -> tuple[Floats, dict[str, object]]:
         """Go back to the start of an episode."""
         super().reset(seed=seed, options=options)
         self.session.restore(self._start)

@@ -94,7 +94,7 @@ class FormatError(InputError):
 
 
 class DamageError(FormatError):
-    """A file that is not as it was written: its checksum says so."""
+    """A file that is not as it was written: its checksum or its description says so."""
 
 
 class OutputError(InputError, OSError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["EXTRAS", "missing_package"]
+__all__ = ["APART", "EXTRAS", "missing_package"]
 
 #: Extra to the packages it brings, named as they are imported.
 EXTRAS = {
@@ -12,11 +12,14 @@ EXTRAS = {
     "cluster": ("dask", "distributed"),
     "gym": ("gymnasium",),
     "learn": ("sklearn",),
-    "optimise": ("cma", "pymoo"),
+    "optimise": ("pymoo",),
     "progpy": ("progpy",),
     "query": ("duckdb", "polars"),
     "sampling": ("emcee",),
 }
+
+#: Extras that ``all`` leaves out: of studies and tests alone, under another licence, for queries.
+APART = frozenset({"optimise", "progpy", "query", "sampling"})
 
 
 def missing_package(error: ModuleNotFoundError) -> str | None:
@@ -24,8 +27,8 @@ def missing_package(error: ModuleNotFoundError) -> str | None:
     package = (error.name or "").partition(".")[0]
     for extra, packages in EXTRAS.items():
         if package in packages:
+            more = "" if extra in APART else " (or 'elevon[all]')"
             return (
-                f"this needs {package}, which is not installed: pip install 'elevon[{extra}]' "
-                "(or 'elevon[all]')"
+                f"this needs {package}, which is not installed: pip install 'elevon[{extra}]'{more}"
             )
     return None

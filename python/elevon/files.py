@@ -27,6 +27,7 @@ __all__ = [
     "read_regular",
     "step",
     "sync_folder",
+    "visible",
     "write_bytes",
     "write_text",
 ]
@@ -123,6 +124,11 @@ def _is_left_over(path: Path, about: os.stat_result) -> bool:
         if os.path.samestat(other.lstat(), about)
     ]
     return len(names) == about.st_nlink - 1
+
+
+def visible(folder: Path, pattern: str) -> list[Path]:
+    """Return a folder's entries of a pattern, sorted, without what a killed writer left behind."""
+    return sorted(path for path in folder.glob(pattern) if not path.name.startswith("."))
 
 
 def read_regular(path: str | os.PathLike[str], limit: int) -> bytes:

@@ -9,7 +9,7 @@ from elevon.units import check_kind, shown_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.estimate import Estimate
+    from elevon.estimate import Estimate
 
 __all__ = [
     "estimate_row",

@@ -132,6 +132,10 @@ def unit_of(parameter: WaveParameter, port_unit: str) -> str:
 #: Names of instants: any of them may be anywhere on the time axis.
 _INSTANTS = frozenset({"start", "end", "time"})
 _POSITIVE = frozenset({"period", "sweep_time", "start_period", "end_period"})
+_SHORTEST = 1e-9
+"""Shortest cycle [s]. ASSUMED: a thousandth of the shortest steps of the models in use."""
+_SHORTEST_PART = 1e-12
+"""Shortest cycle as a part of the start: time then places its phase within 2e-4 of a cycle."""
 
 
 def check_values(record: WaveRecord, values: Mapping[str, float], place: str) -> None:
@@ -140,8 +144,8 @@ def check_values(record: WaveRecord, values: Mapping[str, float], place: str) ->
     Raises
     ------
     InputError
-        A negative duration or frequency, a zero period, a switch that is neither 0 nor 1, a duty
-        outside 0 to 1, or an end before the start.
+        A negative duration or frequency, a cycle too short for its phase to have digits, a switch
+        that is neither 0 nor 1, a duty outside 0 to 1, or an end before the start.
     """
     for parameter in record.parameters:
         name, value = parameter.name, values[parameter.name]
@@ -160,16 +164,28 @@ def check_values(record: WaveRecord, values: Mapping[str, float], place: str) ->
             f"{place}: ends before it starts: end = {values['end']:g} s, "
             f"start = {values['start']:g} s"
         )
-    if record.kind == "trapezoid":
-        _check_cycle(values, place)
+    _check_cycle(record, values, place)
     if values.get("acceleration"):
         _check_acceleration(record, values, place)
 
 
-def _check_cycle(values: Mapping[str, float], place: str) -> None:
-    cycle = sum(values[name] for name in ("rise", "hold_high", "fall", "hold_low"))
-    if values["repeat"] and cycle <= 0.0:
-        raise InputError(f"{place}: a repeated trapezoid needs a cycle longer than zero")
+def _check_cycle(record: WaveRecord, values: Mapping[str, float], place: str) -> None:
+    """Check that time has digits enough for the phase of what repeats."""
+    least = max(_SHORTEST, _SHORTEST_PART * abs(values.get("start", 0.0)))
+    for parameter in record.parameters:
+        name, value = parameter.name, values[parameter.name]
+        fast = parameter.unit == "Hz" and value * least > 1.0
+        if fast or (name in _POSITIVE and value < least):
+            what = "above" if fast else "below"
+            limit = 1.0 / least if fast else least
+            raise InputError(f"{place}: {name} = {value:g} {parameter.unit}: {what} {limit:g}")
+    if record.kind == "trapezoid" and values["repeat"]:
+        cycle = sum(values[name] for name in ("rise", "hold_high", "fall", "hold_low"))
+        if cycle < least:
+            raise InputError(
+                f"{place}: a repeated trapezoid needs a cycle longer than zero and than the "
+                f"rounding of its time: {cycle:g} s, at least {least:g} s"
+            )
 
 
 def _check_acceleration(record: WaveRecord, values: Mapping[str, float], place: str) -> None:

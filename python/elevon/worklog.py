@@ -172,7 +172,7 @@ class WorkLog:
         self.cut = False
 
 
-def digest(path: Path) -> dict[str, Any]:
+def digest(path: Path) -> dict[str, object]:
     """Return size and SHA-256 of a file.
 
     Raises

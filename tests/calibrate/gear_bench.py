@@ -6,7 +6,7 @@ from elevon import Actuator
 from elevon.bench.loaded import run_loaded
 from elevon.bench.procedure import Procedure, load_procedure
 from elevon.bench.run import stand_setups
-from elevon.calibrate.gear import gear_log
+from elevon.calibrate.stages import role_log
 
 #: Half range of the logarithm of each number that is drawn.
 SPREADS = {
@@ -57,7 +57,7 @@ def chosen(name, traces):
 def make_logs(model, procedures, *, seed, fidelity="low"):
     """Run procedures and return their logs as the calibration reads them."""
     return [
-        gear_log(run_loaded(setup, fidelity)[0], f"{procedure.name}-{setup.trace.name}")
+        role_log(run_loaded(setup, fidelity)[0], f"{procedure.name}-{setup.trace.name}", model)
         for procedure in procedures
         for setup in stand_setups(procedure, model, seed=seed)
     ]

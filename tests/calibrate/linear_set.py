@@ -3,7 +3,8 @@
 import numpy as np
 
 from elevon import Actuator
-from elevon.calibrate.closed_loop import LoopLog
+from elevon.calibrate.closed_loop import loop_log
+from elevon.logs.log import Log
 from tests.calibrate.linear import Linear
 
 #: What the datasheet gives of the moving mass and of the inertia: not the truth.
@@ -37,15 +38,16 @@ def datasheet(bench: Linear) -> Actuator:
     return Actuator.load("nasa-ballscrew").with_values(values)
 
 
-def loop(name: str, columns: dict[str, np.ndarray], *, magnitude: bool = False) -> LoopLog:
+def loop(name: str, columns: dict[str, np.ndarray]) -> Log:
     """The columns of a log in SI, as an import makes them."""
     time = 1e-3 * (columns["time"] - columns["time"][0])
-    signals = {
-        "position": 1e-3 * columns["position"],
-        "speed": 1e-3 * columns["speed"],
-        "current": columns["current"],
+    channels = {
+        "command": 1e-3 * columns["demand"],
+        "output_position": 1e-3 * columns["position"],
+        "output_speed": 1e-3 * columns["speed"],
+        "torque_current": columns["current"],
     }
-    return LoopLog(name, time, 1e-3 * columns["demand"], signals, magnitude=magnitude)
+    return loop_log(Log(name, time, channels))
 
 
 def truth(bench: Linear) -> dict[str, float]:

@@ -6,7 +6,7 @@ from elevon import Actuator
 from elevon.bench.loaded import run_loaded
 from elevon.bench.procedure import load_procedure
 from elevon.bench.run import stand_setups
-from elevon.calibrate.screw import motor_ratio, screw_log
+from elevon.calibrate.stages import role_log
 
 #: Half range of the logarithm of each number that is drawn.
 SPREADS = {
@@ -48,5 +48,5 @@ def make_logs(model, procedures, *, seed, fidelity):
         ready = load_procedure(procedure) if isinstance(procedure, str) else procedure
         for setup in stand_setups(ready, model, seed=seed):
             name = f"{ready.name}-{setup.trace.name}"
-            logs.append(screw_log(run_loaded(setup, fidelity)[0], name, motor_ratio(model)))
+            logs.append(role_log(run_loaded(setup, fidelity)[0], name, model))
     return logs

@@ -3,11 +3,14 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from elevon import Actuator
 from elevon.calibrate import read_logs
+from elevon.calibrate.backlash import _spans, _unloaded
 from elevon.calibrate.zeros import position_estimates
+from elevon.cli import main
 from tests.calibrate.foreign import NOLOAD, draw, run
 from tests.calibrate.foreign_files import Style, write_trial
 
@@ -49,3 +52,30 @@ def test_one_backlash_in_all_logs_is_one_estimate(logs):
     estimates, findings = position_estimates(logs[:1], Actuator.load("torino-rotary"))
     assert "backlash.total" in {item.path for item in estimates}
     assert findings == ()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 4])
+def test_weights_that_deflect_the_transmission_are_no_backlash(tmp_path, seed):
+    """A free output under hung weights: the log's whole span is twice the backlash."""
+    words = ["bench", "run", "compliance", "--actuator", "torino-rotary", "--seed", seed]
+    assert main([str(word) for word in [*words, "--out", tmp_path]]) == 0
+    actuator = Actuator.load("torino-rotary")
+    estimates, _ = position_estimates(read_logs([tmp_path / "compliance.csv"]), actuator)
+    (item,) = [item for item in estimates if item.path == "backlash.total"]
+    assert item.interval[0] <= actuator.parameters.value("backlash.total") <= item.interval[1]
+    assert "under load" in item.note
+
+
+def test_the_stretches_that_agree_are_those_without_load():
+    """Six stretches cross a gap of 1, four are deflected beyond it, two stand still."""
+    rng = np.random.default_rng(2)
+    gap = rng.choice([-0.5, 0.5], size=200) + 1e-3 * rng.standard_normal(200)
+    loaded = [gap * factor + 0.1 for factor in (1.2, 1.5, 1.9, 2.4)]
+    at_rest = [1e-3 * rng.standard_normal(200)] * 2
+    unloaded = _unloaded([*[gap] * 6, *loaded, *at_rest], count=0.01)
+    inner, outer, middle = _spans(unloaded)
+    assert len(unloaded) == 6
+    assert inner <= outer == pytest.approx(1.0, abs=0.01)
+    assert middle == pytest.approx(0.0, abs=0.01)
+    assert _unloaded([*loaded, *at_rest], count=0.01) == []

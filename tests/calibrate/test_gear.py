@@ -7,7 +7,8 @@ import pytest
 
 from elevon import Actuator
 from elevon.bench.procedure import load_procedure
-from elevon.calibrate.gear import calibrate_gear
+from elevon.calibrate.stages import calibrate_parts
+from elevon.calibrate.stages.moves import moves_of
 from elevon.errors import InputError
 from tests.calibrate.gear_bench import chosen, drawn, make_logs
 
@@ -24,7 +25,7 @@ def one():
     values, model = drawn(3)
     procedures = [chosen("gear-friction", RIG), chosen("gear-cycles", ["retraction-normal"])]
     logs = make_logs(model, procedures, seed=3)
-    return values, logs, calibrate_gear(logs, Actuator.load("pisa-landing-gear"))
+    return values, logs, calibrate_parts(logs, Actuator.load("pisa-landing-gear"))
 
 
 def test_what_the_logs_determine_is_recovered(one):
@@ -47,7 +48,7 @@ def test_the_model_that_corrects_is_the_one_the_logs_bear(one):
     assert result.facts["fidelity"] == "low"
     assert result.facts["ripple_share"] < 0.2
     with pytest.raises(InputError, match="medium"):
-        calibrate_gear(logs, Actuator.load("pisa-landing-gear"), fidelity="medium")
+        calibrate_parts(logs, Actuator.load("pisa-landing-gear"), fidelity="medium")
 
 
 @pytest.mark.long
@@ -56,7 +57,7 @@ def test_logs_that_switch_are_calibrated_by_the_switching_model(seed):
     """The bench's own default: intervals that hold, and a resistance within them."""
     values, truth = drawn(seed)
     logs = make_logs(truth, [load_procedure("gear-cycles")], seed=seed, fidelity="high")
-    result = calibrate_gear(logs, Actuator.load("pisa-landing-gear"))
+    result = calibrate_parts(logs, Actuator.load("pisa-landing-gear"))
     assert result.facts["fidelity"] == "high"
     assert result.facts["ripple_share"] > 0.8
     covered = [
@@ -82,15 +83,15 @@ def test_what_no_log_shows_is_listed_with_its_reason(one):
 def test_free_takes_some_and_refuses_what_is_not_there(one):
     _, logs, _ = one
     model = Actuator.load("pisa-landing-gear")
-    result = calibrate_gear(logs, model, free=["brake.torque"], fidelity=None)
+    result = calibrate_parts(logs, model, free=["brake.torque"], fidelity=None)
     assert [e.path for e in result.estimates] == ["brake.torque"]
     with pytest.raises(InputError, match="nothing broke"):
-        calibrate_gear(logs, model, free=["lock.strength"], fidelity=None)
+        calibrate_parts(logs, model, free=["lock.strength"], fidelity=None)
 
 
 def test_runs_of_the_motions_take_off_what_the_balances_misread(one):
     values, logs, result = one
-    plain = calibrate_gear(logs, Actuator.load("pisa-landing-gear"), fidelity=None)
+    plain = calibrate_parts(logs, Actuator.load("pisa-landing-gear"), fidelity=None)
     assert plain.facts["motions_run_again"] == 0 < result.facts["motions_run_again"]
     for path in ("motor.winding_resistance", "motor.winding_inductance"):
         before, after = (abs(r[path].value / values[path] - 1.0) for r in (plain, result))
@@ -104,9 +105,9 @@ def few(logs, truth):
     ]
     model = Actuator.load("pisa-landing-gear").with_values({p: truth[p] for p in given})
     bare = [
-        replace(log, roles={role: v for role, v in log.roles.items() if role in ROLES})
+        replace(log, channels={role: v for role, v in log.channels.items() if role in ROLES})
         for log in logs
-        if "retraction" in log.name and log.moves
+        if "retraction" in log.name and moves_of(log)
     ]
     return bare, model
 
@@ -114,7 +115,7 @@ def few(logs, truth):
 def test_position_speed_and_current_give_the_integral_gain(one):
     values, logs, _ = one
     bare, model = few(logs, values)
-    result = calibrate_gear(bare, model, fidelity=None)
+    result = calibrate_parts(bare, model, fidelity=None)
     gain, zero = "control.gain_retraction", "control.zero_retraction"
     product = result[gain].value * model.parameters.value(zero) / (values[gain] * values[zero])
     assert abs(product - 1.0) < max(0.02, 2.5 * result[gain].std / result[gain].value)
@@ -130,7 +131,7 @@ def test_few_channels_over_draws():
         values, truth = drawn(seed)
         logs = make_logs(truth, [load_procedure("gear-cycles")], seed=seed)
         bare, model = few(logs, values)
-        result = calibrate_gear(bare, model)
+        result = calibrate_parts(bare, model)
         item = result["control.gain_retraction"]
         zero = "control.zero_retraction"
         scale = model.parameters.value(zero) / values[zero]
@@ -152,7 +153,7 @@ def test_truth_recovery_over_draws(fidelity, draws):
         values, truth = drawn(seed)
         logs = make_logs(truth, [load_procedure("gear-friction")], seed=seed)
         logs += make_logs(truth, [load_procedure("gear-cycles")], seed=seed, fidelity=fidelity)
-        for item in calibrate_gear(logs, model, fidelity=fidelity).estimates:
+        for item in calibrate_parts(logs, model, fidelity=fidelity).estimates:
             if item.path in values:
                 true = values[item.path]
                 errors.setdefault(item.path, []).append(abs(item.value / true - 1.0))

@@ -7,6 +7,7 @@ import pytest
 
 from elevon import Actuator, Scenario
 from elevon.calibrate import calibrate, read_logs
+from elevon.calibrate.heldout import HeldOut
 from elevon.errors import InputError
 from elevon.simulate import simulate
 from tests.calibrate.bench import CASES, COUNT, make_truth, write_logs
@@ -48,7 +49,7 @@ def test_where_each_log_began_in_the_backlash_is_told_apart_from_the_sensors(res
 
 
 def test_the_load_cell_separates_torque_constant_and_inertia(result):
-    assert result.torque.measured
+    assert result.facts["torque_constant"]["from_load_cell"]
     assert result["motor.emf_constant"].given == ()
     assert result["motor.inertia"].given == ()
 
@@ -56,7 +57,7 @@ def test_the_load_cell_separates_torque_constant_and_inertia(result):
 def test_without_a_load_cell_only_ratios_are_told(truth, tmp_path, before):
     logs = read_logs(write_logs(truth, tmp_path, cell=False))
     result = calibrate(logs, before, model_runs=False, hold_out=False)
-    assert not result.torque.measured
+    assert not result.facts["torque_constant"]["from_load_cell"]
     assert "motor.emf_constant" not in {item.path for item in result.estimates}
     ratio = truth.values["derived.inertia"] / truth.values["derived.torque_constant"]
     assert result["derived.inertia_per_torque"].value == pytest.approx(ratio, rel=0.02)
@@ -79,15 +80,19 @@ def test_unchanged_values_and_old_ones_are_kept(result, before):
 
 
 def test_held_out_logs_are_predicted_as_well_as_fitted_ones(result):
-    assert {row.log for row in result.held_out} == {"noload.csv", "loaded.csv", "chirp.csv"}
-    for row in result.held_out:
+    assert {row["log"] for row in result.facts["held_out"]} == {
+        "noload.csv",
+        "loaded.csv",
+        "chirp.csv",
+    }
+    for row in map(HeldOut.from_dict, result.facts["held_out"]):
         assert row.current < 1.25 * row.current_all + 0.005
         assert row.speed < 1.25 * row.speed_all + 0.02
 
 
 def test_a_single_log_holds_its_end_back(logs, before):
     result = calibrate(logs[:1], before, model_runs=False)
-    assert [row.span for row in result.held_out] == ["last quarter"]
+    assert [row["span"] for row in result.facts["held_out"]] == ["last quarter"]
 
 
 def test_free_keeps_the_others(logs, before):
@@ -108,7 +113,7 @@ def test_an_amplitude_factor_is_found_and_named(truth, tmp_path, before, where):
         assert result["sensor.encoder.gain"].value == pytest.approx(1.015, abs=1e-4)
         assert any("encoder gain" in text for text in says)
     else:
-        assert result.commands[0].factor == pytest.approx(1.03, abs=1e-3)
+        assert result.facts["commands"][0]["amplitude_factor"] == pytest.approx(1.03, abs=1e-3)
         assert any("command is scaled" in text for text in says)
 
 
@@ -122,9 +127,8 @@ def test_another_speed_limit_is_seen(truth, tmp_path, before):
 def test_the_kind_of_drive_is_found(logs):
     result = calibrate(logs[:1], Actuator.load("torino-rotary"), hold_out=False)
     assert result.actuator.parameters["drive.kind"].value == "pwm"
-    assert result.dynamic is not None
     assert any("drive.kind" in text for text in result.findings)
-    assert np.all(np.diff(result.dynamic.ranking.singular_values) <= 0.0)
+    assert np.all(np.diff(result.facts["identifiability"]["singular_values"]) <= 0.0)
 
 
 @pytest.mark.long
@@ -217,8 +221,7 @@ def test_a_two_mass_bench_fitted_with_the_low_model(tmp_path, before):
     for error in checked.errors:
         if error.signal == "encoder_position" and error.log != "chirp.csv":
             assert error.rms < 0.5 * truth.values["backlash.total"]
-    assert result.dynamic is not None
-    absorbed = {path for path, *_ in result.dynamic.absorbed}
+    absorbed = {row["path"] for row in result.facts["simulation_fit"]["absorbed"]}
     assert absorbed
     assert all(any(path in text for text in result.findings) for path in absorbed)
 

@@ -1,6 +1,7 @@
 """What cannot be calibrated is refused with its reason; what is requested is never guessed."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,8 @@ import pytest
 from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs
 from elevon.calibrate.candidates import candidates
-from elevon.calibrate.identify import choose
-from elevon.calibrate.problem import Problem
+from elevon.calibrate.identify import SensitivityTable, choose
+from elevon.calibrate.speed_runs import SpeedRuns
 from elevon.cli.runner import run
 from elevon.errors import InputError, Interrupted, UnknownNameError
 from elevon.logs.formats.drive import write_drive_csv
@@ -82,9 +83,7 @@ def test_missing_columns_are_named(tmp_path, logs):
         read_logs([standing(tmp_path / "a", motor_speed=None)])
     with pytest.raises(InputError, match="no torque current"):
         read_logs([standing(tmp_path / "b", current_ref=None, current_q_meas=None)])
-    with pytest.raises(InputError, match="at least one log"):
-        read_logs([])
-    assert logs[0].current_signal == "current_q_meas"
+    assert logs[0].has("torque_current")
 
 
 def test_optional_columns_may_lack(tmp_path, truth, before):
@@ -99,7 +98,7 @@ def test_optional_columns_may_lack(tmp_path, truth, before):
     ]
     path.write_text("\n".join(lines) + "\n")
     data = read_logs([path])
-    assert data[0].current_signal == "current_ref"
+    assert not data[0].has("torque_current")
     result = calibrate(data, before, model_runs=False, hold_out=False)
     ratio = truth.values["friction.dynamic"] / truth.values["derived.torque_constant"]
     scale = 1.5 * before.parameters.value("motor.emf_constant")
@@ -118,28 +117,28 @@ def test_the_ranking_drops_what_cannot_be_told_and_names_the_rival(logs, before)
         for item in candidates(pwm, logs[:1], ["motor.inertia", "gear.inertia"])
         if item.kind == "parameter"
     ]
-    problem = Problem(pwm, logs[:1])
-    x = np.array([item.inner(pwm.parameters.value(item.path)) for item in free])
-    # Steps that the instants of sticking, which differ from run to run, do not blur.
-    jac = problem.jacobian(free, x, np.full(2, 0.05))
-    residual = problem.residual(problem.simulate([{}])[0])
-    blocks = [np.floor(logs[0].time).astype(np.int64)]
-    kept, ranking = choose(free, jac, residual, blocks, [])
+    lanes = SpeedRuns(pwm, logs[:1]).lanes([replace(item, spread=0.5) for item in free])
+    point = lanes.point(lanes.first)
+    jac = lanes.jacobian([point], central=True)[0]
+    blocks = lanes.blocks(point.residual)
+    seen = SensitivityTable(tuple(free), 0.2 * jac, point.residual, blocks)
+    kept, ranking = choose(seen, [])
     assert len(kept) == 1
     assert len(ranking.dropped) == 1
     with pytest.raises(InputError, match="cannot"):
-        choose(free, jac, residual, blocks, [item.path for item in free])
+        choose(seen, [item.path for item in free])
 
 
 def test_exact_derivatives_agree_with_differences_where_nothing_switches(logs, before):
     pwm = before.with_values({"drive.kind": "pwm"})
-    problem = Problem(pwm, logs[:1])
+    runs = SpeedRuns(pwm, logs[:1])
     path = "friction.viscous"
     value = pwm.parameters.value(path)
-    exact = problem.exact(0, {path: value}, [path])[path]
-    up, down = (r[0] for r in problem.simulate([{path: 1.01 * value}, {path: 0.99 * value}]))
-    finite = np.column_stack((up.speed - down.speed, up.current - down.current)) / (0.02 * value)
-    assert np.linalg.norm(exact - finite) < 0.1 * np.linalg.norm(finite)
+    exact = runs.experiments[0].sensitivities(runs.variant(logs[0], {path: value}), [path])[path]
+    up, down = (r[0] for r in runs.simulate([{path: 1.01 * value}, {path: 0.99 * value}]))
+    for role in ("motor_speed", "torque_current"):
+        finite = (up[role] - down[role]) / (0.02 * value)
+        assert np.linalg.norm(exact[role] - finite) < 0.1 * np.linalg.norm(finite)
 
 
 def test_command_line(tmp_path, log_paths, capsys):

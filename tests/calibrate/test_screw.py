@@ -1,13 +1,18 @@
 """Ballscrew: what was put in comes out of the stand's logs, the rest with a reason."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from elevon import Actuator
 from elevon.bench.procedure import Procedure
-from elevon.calibrate.screw import ScrewLog, calibrate_screw, motor_ratio
-from elevon.calibrate.screw.loops_by_current import loops_by_current
-from elevon.calibrate.screw.torque import relieved
+from elevon.calibrate.stages import calibrate_parts, motor_ratio
+from elevon.calibrate.stages.context import Context
+from elevon.calibrate.stages.loops_by_current import loops_by_current
+from elevon.calibrate.stages.screw import relieved
+from elevon.calibrate.stages.smooth import smooth
+from elevon.logs.log import Log
 from tests.calibrate.screw_bench import drawn, make_logs
 
 FIRST = 201  # none of these was looked at while the balances were written
@@ -31,7 +36,7 @@ def one():
     """Truth, logs and calibration of one draw: switching model, two short logs."""
     values, model = drawn(5)
     logs = make_logs(model, [TWO], seed=5, fidelity="high")
-    return values, logs, calibrate_screw(logs, Actuator.load("nasa-ballscrew"))
+    return values, logs, calibrate_parts(logs, Actuator.load("nasa-ballscrew"))
 
 
 def test_what_the_logs_determine_is_recovered(one):
@@ -57,11 +62,11 @@ def test_what_no_log_shows_is_listed_with_its_reason(one):
 def test_without_the_voltage_torques_are_ratios(one):
     values, logs, _ = one
     blind = [
-        type(log)(log.name, log.time, {r: v for r, v in log.roles.items() if "voltage" not in r})
+        replace(log, channels={r: v for r, v in log.channels.items() if "voltage" not in r})
         for log in logs
     ]
     before = Actuator.load("nasa-ballscrew")
-    result = calibrate_screw(blind, before)
+    result = calibrate_parts(blind, before)
     assert "motor.emf_constant" in result.undetermined
     assert "motor.emf_constant" in result["motor.inertia"].given
     scale = before.parameters.value("motor.emf_constant") / values["motor.emf_constant"]
@@ -86,7 +91,9 @@ def test_without_set_points_the_current_gives_the_speed_gain():
         "motor_speed": np.gradient(ratio * command - error, step),
         "torque_current": torque / value("control.torque_constant"),
     }
-    levels, reasons = loops_by_current([ScrewLog("pid", time, roles)], actuator)
+    context = Context([Log("pid", time, roles)], actuator)
+    loops_by_current(context)
+    levels, reasons = context.levels, context.reasons
     assert levels["control.speed_gain"].value == pytest.approx(gain, rel=0.02)
     for path in ("control.position_gain", "control.integral_time"):
         assert path in levels or "change places" in reasons[path]
@@ -102,8 +109,8 @@ def test_slopes_are_smoothed_as_the_values_are():
     """A trapezoid's corners, smoothed: the slope of the smoothed value is the smoothed slope."""
     time = np.arange(2000) * 2e-3
     ramp = np.abs((time / 0.8) % 2.0 - 1.0)
-    log = ScrewLog("trapezoid", time, {"motor_speed": ramp})
-    smoothed = log.smooth
+    log = Log("trapezoid", time, {"motor_speed": ramp})
+    smoothed = smooth(log)
     slope = np.gradient(smoothed["motor_speed"], 2e-3)
     inner = slice(50, -50)
     assert np.max(np.abs(smoothed["acceleration"] - slope)[inner]) < 0.02 * np.ptp(slope)
@@ -119,7 +126,7 @@ def test_truth_recovery_over_draws(name, draws):
         values, truth = drawn(seed, name)
         logs = make_logs(truth, ["ballscrew-profiles"], seed=seed, fidelity="high")
         logs += make_logs(truth, ["ballscrew-heating"], seed=seed, fidelity="low")
-        for item in calibrate_screw(logs, before).estimates:
+        for item in calibrate_parts(logs, before).estimates:
             if item.path in values:
                 true = values[item.path]
                 errors.setdefault(item.path, []).append(abs(item.value / true - 1.0))

@@ -18,10 +18,10 @@ BASE = Actuator.load("torino-rotary")
 def estimate(paths, constant=None):
     """Return the static friction that logs show; the torque constant as given or as measured."""
     logs = read_logs(paths)
-    keeps = [log.good & (log.time >= 1.0) for log in logs]
-    plant = torque_balance(logs, keeps)
+    used = [log.counting(log.time >= 1.0) for log in logs]
+    plant = torque_balance(used)
     scale = torque_scale(BASE, plant)
-    static = static_friction(logs, keeps, plant, constant or scale.constant)
+    static = static_friction(used, plant, constant or scale.constant)
     return static_estimate(BASE, static, None, scale)[0]
 
 

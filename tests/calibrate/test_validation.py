@@ -1,12 +1,16 @@
 """The closed loop against logs: what agrees passes, what does not fails, with its numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import elevon
 from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs, validate
-from elevon.calibrate.promise import held_out_agreement, outliers, thresholds
+from elevon.calibrate.promise import held_out_agreement
 from elevon.calibrate.report import calibration_report, validation_report
+from elevon.calibrate.thresholds import outliers, thresholds
 from elevon.calibrate.validation import SIGNALS, SignalError, Validation
 from elevon.calibrate.write import write_calibration
 from elevon.errors import InputError, UnknownNameError
@@ -81,8 +85,8 @@ def test_a_transient_longer_than_the_log_is_refused(logs, before):
 
 @pytest.mark.long
 def test_reports_hold_what_was_found(logs, result, checked, before, truth, tmp_path):
-    page = calibration_report(result, validate(logs, before), checked, truth=truth.values)
-    html = page.html()
+    judged = replace(result, validation_before=validate(logs, before), validation=checked)
+    html = calibration_report(judged, truth=truth.values).html()
     for item in result.estimates:
         assert item.path in html
     assert "<script src" not in html
@@ -90,6 +94,10 @@ def test_reports_hold_what_was_found(logs, result, checked, before, truth, tmp_p
         assert signal in html
     assert len(SIGNALS) == 3
     assert validation_report(checked).status is None
+    back = elevon.load(judged.save(tmp_path / "result.json"))
+    assert back == judged
+    assert back.report().html().count("<svg") == judged.report().html().count("<svg")
+    assert back.actuator.parameters == result.actuator.parameters
 
 
 def test_names_of_logs_are_escaped(truth, tmp_path, before):

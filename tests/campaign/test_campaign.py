@@ -202,7 +202,7 @@ def test_going_on_does_only_what_is_missing(write, tmp_path, capsys):
 
 
 def test_a_killed_batch_goes_on(write, tmp_path):
-    scenario = SCENARIO.replace("0.2 s", "300 s")
+    scenario = SCENARIO.replace("0.2 s", "100 s")
     path = write(HEAD, "runs_per_file = 1\n", "seeds = [1, 2, 3, 4]\n", scenario, SHORTS)
     out = tmp_path / "out"
     command = [sys.executable, "-m", "elevon.cli", "campaign", "run", str(path)]

@@ -10,6 +10,7 @@ from elevon.campaign import block as block_module
 from elevon.campaign import execute as execute_module
 from elevon.campaign import read_manifest
 from elevon.cli import main
+from elevon.errors import FormatError
 
 NAMES = ("manifest.json", "resolved.json", "plan.toml", "runs.parquet")
 
@@ -141,6 +142,20 @@ def test_commands_that_meet_damage_name_the_repair(made, tmp_path, capsys, name)
         more = ["--out", str(tmp_path / "x")] if "export" in command else []
         assert main([*command, str(out), *more]) == 2
         assert f"elevon dataset repair {out}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "remedy"), [
+    ("runs.parquet", "elevon dataset repair {}"),
+    ("runs/at_400_hz/block_00001.parquet", "elevon campaign resume {} simulates its runs again"),
+])  # fmt: skip
+def test_a_table_that_is_damaged_names_its_remedy(made, tmp_path, name, remedy):
+    out = tmp_path / "set"
+    shutil.copytree(made / "whole", out)
+    flip(out / name)
+    ds = elevon.load_campaign(out)
+    with pytest.raises(FormatError) as raised:
+        (ds.signals if "block" in name else ds.runs).to_arrow()
+    assert remedy.format(out) in str(raised.value)
 
 
 def test_a_lost_block_is_named_and_simulated_by_resume(made, tmp_path, capsys):

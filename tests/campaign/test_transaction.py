@@ -10,7 +10,9 @@ import pytest
 import elevon
 from elevon import files
 from elevon.campaign import read_manifest
+from elevon.campaign.store import LOG
 from elevon.cli import main
+from elevon.worklog import WorkLog
 
 SPLIT = ("--share", "fit=0.75", "--share", "hold=0.25")
 FORK = multiprocessing.get_context("fork")
@@ -78,7 +80,7 @@ def state(folder):
     return "new" if found == NEW else "old"
 
 
-@pytest.mark.parametrize("every", [6, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("every", [12, pytest.param(1, marks=pytest.mark.long)])
 def test_a_split_killed_at_each_step_leaves_the_old_or_the_new(made, tmp_path, capsys, every):
     source, plan = made
     out = tmp_path / "set"
@@ -109,7 +111,7 @@ def test_a_full_disk_at_each_step_of_a_split_leaves_the_old_or_the_new(made, tmp
     shutil.copytree(source, out)
     steps = counted(lambda: main(["dataset", "split", str(out), *SPLIT]))
     usual = files.step
-    for at in range(0, len(steps), 7):
+    for at in range(0, len(steps), 14):
         shutil.rmtree(out)
         shutil.copytree(source, out)
         count = iter(range(len(steps) + 100))
@@ -153,4 +155,18 @@ def test_a_block_simulated_again_keeps_the_split(made, tmp_path, capsys):
     assert main(["campaign", "run", str(plan), "--out", str(out)]) == 0
     assert parts(out) == NEW
     assert main(["dataset", "verify", str(out)]) == 0
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("command", ["run", "resume", "repair"])
+def test_a_log_left_beside_a_finished_campaign_goes(made, tmp_path, capsys, command):
+    source, plan = made
+    out = tmp_path / "set"
+    shutil.copytree(source, out)
+    WorkLog.begin(out / LOG, read_manifest(out).plan_hash)
+    words = {"run": ["campaign", "run", str(plan), "--out", str(out)],
+             "resume": ["campaign", "resume", str(out)],
+             "repair": ["dataset", "repair", str(out)]}  # fmt: skip
+    assert main(words[command]) == 0
+    assert sorted(p.name for p in out.iterdir()) == sorted(p.name for p in source.iterdir())
     capsys.readouterr()

@@ -13,6 +13,7 @@ from elevon.bench.state import finished_logs
 from elevon.cli import interrupt, main
 from elevon.errors import OutputExistsError
 from elevon.files import journal, write_text
+from tests.patches import put
 
 TRACE = (
     '[[step]]\nkind = "trace"\nname = "{}"\nduration = "{}"\n'
@@ -90,7 +91,7 @@ def test_every_command_says_that_it_was_interrupted(name, log, tmp_path, capsys,
         'actuator = "torino-rotary"\nseeds = [1]\n[scenario]\nduration = "10 ms"\n'
         '[[scenario.command.terms]]\nkind = "constant"\nvalue = "1 deg"\n'
     )
-    monkeypatch.setattr(inner, press)
+    put(monkeypatch, inner, press)
     places = {"LOG": str(log), "OUT": str(tmp_path / "out"), "PLAN": str(plan)}
     for word, place in places.items():
         command = [part.replace(word, place) for part in command]
@@ -141,7 +142,7 @@ def test_an_error_that_ctrl_c_became_in_a_library(capsys, monkeypatch):
         except KeyboardInterrupt:
             raise SystemError("initialization raised unreported exception") from None
 
-    monkeypatch.setattr("elevon.bench.spring.design_spring", broken)
+    put(monkeypatch, "elevon.bench.spring.design_spring", broken)
     assert main(["design", "spring"]) == 130
     assert "interrupted" in capsys.readouterr().err
 
@@ -150,7 +151,7 @@ def test_an_error_without_ctrl_c_stays_one(monkeypatch):
     def broken(*_arguments, **_options):
         raise SystemError("ours")
 
-    monkeypatch.setattr("elevon.bench.spring.design_spring", broken)
+    put(monkeypatch, "elevon.bench.spring.design_spring", broken)
     with pytest.raises(SystemError, match="ours"):
         main(["design", "spring"])
 
@@ -174,7 +175,7 @@ def test_a_lost_ctrl_c_comes_again(capsys, monkeypatch):
             time.sleep(0.01)
         raise AssertionError("the work went on")
 
-    monkeypatch.setattr("elevon.bench.spring.design_spring", long_work)
+    put(monkeypatch, "elevon.bench.spring.design_spring", long_work)
     assert main(["design", "spring"]) == 130
     captured = capsys.readouterr()
     assert "interrupted" in captured.err
@@ -198,7 +199,7 @@ def test_no_second_ctrl_c_cuts_the_message(capsys, monkeypatch, tmp_path):
         return "all of it"
 
     monkeypatch.setattr("elevon.cli.bench._story", describe)
-    monkeypatch.setattr("elevon.bench.run.recorded", press)
+    put(monkeypatch, "elevon.bench.run.recorded", press)
     run = ["bench", "run", "chirp", "--actuator", "torino-rotary", "--out", str(tmp_path / "o")]
     assert main(run) == 130
     assert capsys.readouterr().err.endswith("elevon: interrupted; all of it\n")
@@ -250,7 +251,7 @@ def test_a_process_group_stopped_in_the_core_goes_on_later(tmp_path):
 def test_the_exit_code_is_the_same_where_the_exception_passed_through_exec(tmp_path):
     """Python started with -m remembers such an exception and would end by the signal."""
     (tmp_path / "design.py").write_text(
-        "import signal, sys, elevon.bench.spring as spring\n"
+        "import signal, sys; from elevon.bench import spring\n"
         "from elevon.cli import main\n"
         "def design(*a, **k): exec('signal.raise_signal(signal.SIGINT)', globals())\n"
         "spring.design_spring = design\n"

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -225,13 +226,25 @@ def start(*arguments, cwd):
 LONG = ("simulate", "torino-rotary", "--duration", "500", "--out", "run.parquet", "--json")
 
 
+def underway(process):
+    """Wait until the run is in the core: the core is loaded, and a second has passed."""
+    maps = Path(f"/proc/{process.pid}/maps")
+    while maps.exists() and "_core.abi3" not in maps.read_text():
+        assert process.poll() is None
+        time.sleep(0.1)
+    time.sleep(1.0 if maps.exists() else 2.0)
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
 def test_a_stopped_run_leaves_nothing(tmp_path, number, code):
-    process = start(*LONG, cwd=tmp_path)
-    time.sleep(2.0)
-    assert process.poll() is None
-    process.send_signal(number)
-    out, err = process.communicate(timeout=20)
+    with start(*LONG, cwd=tmp_path) as process:
+        underway(process)
+        assert process.poll() is None
+        process.send_signal(number)
+        try:
+            out, err = process.communicate(timeout=20)
+        finally:
+            process.kill()
     assert process.returncode == code, err
     assert out == ""
     assert list(tmp_path.iterdir()) == []

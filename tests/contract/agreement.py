@@ -108,7 +108,7 @@ def apart(
     runs are not compared among themselves: what is requested stands far above their differences.
     `planted` is an error of the reduced-order model's severities, to be seen.
     """
-    choices = (*choices, *_shared(name))
+    choices = (*choices, *shared_choices(name))
     pair = Pair(*(Cell(name, fidelity, choices, push) for fidelity in ("high", "low")),
                 duration, planted)  # fmt: skip
     chosen = [variant for variant in _carried(pair) if not only or variant.name in only]
@@ -222,7 +222,7 @@ def _floors(cell: Cell, healthy: Sizes) -> dict[str, float]:
     }
 
 
-def _shared(name: str) -> Choices:
+def shared_choices(name: str) -> Choices:
     """Choices that the reduced-order model declines, at their defaults: both models then agree."""
     actuator = shipped.actuator(name)
     return tuple(
@@ -234,4 +234,4 @@ def _shared(name: str) -> Choices:
     )  # fmt: skip
 
 
-__all__ = ["apart", "sizes_of"]
+__all__ = ["apart", "shared_choices", "sizes_of"]

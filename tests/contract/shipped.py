@@ -85,7 +85,8 @@ def motion(name: str) -> dict[str, Any]:
         },
     }
     if takes_actions(name):
-        # A short stroke back, out and down: every switch, the lock and the release change.
+        # A short stroke back, out and down: every switch, the lock and the release change;
+        # weight on wheels for a moment of the way out.
         data = {
             "duration": "2.5 s",
             "command": {
@@ -98,6 +99,7 @@ def motion(name: str) -> dict[str, Any]:
                 ],
             },
             "initial": {"nut_position": "13 mm"},
+            "load": {"weight_on_wheels": {"terms": [ON_WHEELS]}},
             "parameters": {
                 "lever.stroke": "10 mm",
                 "proximity.position_25": "3 mm",
@@ -105,6 +107,14 @@ def motion(name: str) -> dict[str, Any]:
             },
         }
     return copy.deepcopy(data)
+
+
+#: On between 1.2 and 1.4 s.
+ON_WHEELS = {
+    "kind": "table",
+    "times": [0.0, 1.2, 1.2001, 1.4, 1.4001, 10.0],
+    "values": [0.0, 0.0, 1.0, 1.0, 0.0, 0.0],
+}
 
 
 def default(name: str, supply: float) -> dict[str, Any]:

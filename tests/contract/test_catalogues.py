@@ -86,7 +86,7 @@ def test_every_port_and_mode_of_the_core_has_its_place_in_a_scenario() -> None:
     from elevon.scenario.scenario import Command, Load
 
     ports = {port["name"] for name in {w for w, _ in WIRINGS} for port in _core.ports(name)}
-    assert ports == {"command", "supply", *Load.model_fields}
+    assert ports == {"command", "supply", "ambient", *Load.model_fields}
     modes = {mode for wiring in _core.wirings() for mode in wiring["modes"]}
     assert modes == set(get_args(Command.model_fields["mode"].annotation))
     assert all(set(w["mode_units"]) == set(w["modes"]) for w in _core.wirings())

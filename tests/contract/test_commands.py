@@ -58,10 +58,12 @@ def test_bench_run_and_import(bench, tmp_path, capsys):
     assert {"motor_speed", "output_position", "torque_current"} <= Recording.load(out).roles.keys()
 
 
-def test_validate_on_the_model_that_made_the_log(bench, capsys):
+def test_validate_on_the_model_that_made_the_log(bench, tmp_path, capsys):
     name, log = bench
     words = ["validate", log, "--actuator", name, "--transient", "2", "--json"]
-    report = run(capsys, *words)
+    page = tmp_path / "page.html"
+    report = run(capsys, *words, "--report", page)
+    assert all(row["log"] in page.read_text("utf-8") for row in report["signals"])
     errors = {row["signal"]: row["rms_percent_of_range"] for row in report["signals"]}
     speed = errors["motor_speed"]
     assert speed < 2.0

@@ -59,16 +59,19 @@ def disagreements(places: Iterable[Place]) -> tuple[list[str], int]:
 
 
 def test_parameters_at_neutral_values() -> None:
-    wrong, compared = disagreements(parameter_places(Motion("torino-rotary", "pwm"), neutral=True))
+    """Every fourth one; the long form takes each."""
+    motion = Motion("torino-rotary", "pwm")
+    wrong, compared = disagreements(list(parameter_places(motion, neutral=True))[::4])
     assert not wrong
-    assert compared > 130
+    assert compared > 32
 
 
 def test_faults_of_severity_zero() -> None:
+    """Every third one; the long form takes each."""
     motion = Motion("nasa-ballscrew", "hysteresis")
-    wrong, compared = disagreements(fault_places(motion, neutral=True))
+    wrong, compared = disagreements(list(fault_places(motion, neutral=True))[::3])
     assert not wrong
-    assert compared > 30
+    assert compared > 10
 
 
 @pytest.mark.long

@@ -14,8 +14,8 @@ from elevon import _core
 from elevon.bench.stand import stand_of
 from elevon.diagnose.bymodel.candidates import CANDIDATES
 from elevon.diagnose.byroles.candidates import candidates_of, counted_of, switched_of
-from elevon.diagnose.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
 from elevon.units import parse_quantity
+from studies.fault_limits.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
 from tests.contract import shipped
 
 TESTED = [name for name in shipped.names() if standard_tests(shipped.actuator(name))]

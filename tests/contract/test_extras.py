@@ -12,7 +12,7 @@ import pytest
 from elevon import Recording
 from elevon.cli import main
 from elevon.errors import FormatError
-from elevon.extras import EXTRAS, missing_package
+from elevon.extras import APART, EXTRAS, missing_package
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = {"numpy", "pydantic", "rich", "typer", "elevon"}
@@ -69,7 +69,7 @@ def test_the_core_is_four_packages_and_the_table_is_that_of_the_project():
         for package in packages:
             assert {package, BROUGHT.get(package)} & brought, (extra, package)
     (everything,) = optional["all"]
-    assert set(re.findall(r"\w+", everything)) - {"elevon"} == set(EXTRAS) - {"progpy", "query"}
+    assert set(re.findall(r"\w+", everything)) - {"elevon"} == set(EXTRAS) - APART
 
 
 @pytest.mark.parametrize("extra", EXTRAS)

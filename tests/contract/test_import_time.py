@@ -44,3 +44,15 @@ def test_names_resolve_and_submodules_do_not_hide_functions_of_their_name():
         "print(callable(elevon.simulate), all(hasattr(elevon, name) for name in elevon.__all__))"
     )
     assert _python(code).split() == ["True", "True"]
+
+
+def test_doors_stay_doors_after_every_import():
+    """A package of the same name takes no door away: calibrate, diagnose, bench, compare."""
+    code = (
+        "import elevon, elevon.cli, elevon.calibrate.ways, elevon.bench.run, elevon.compare, "
+        "elevon.diagnose.bymodel, elevon.response; "
+        "doors = 'bench calibrate compare diagnose effects fleet monitor next_test predict "
+        "read_log response validate'; "
+        "print({type(getattr(elevon, name)).__name__ for name in doors.split()})"
+    )
+    assert _python(code).strip() == "{'function'}"

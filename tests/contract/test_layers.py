@@ -12,9 +12,9 @@ PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
 ROWS = [
     ["retired", "arrays", "_core"],
     ["errors", "extras"],
-    ["units", "files", "progress", "memory", "data", "threads"],
-    ["documents", "series", "number_text", "report", "worklog", "containers"],
-    ["transaction"],
+    ["units", "files", "progress", "memory", "data", "threads", "plain"],
+    ["documents", "series", "number_text", "report", "worklog", "containers", "estimate"],
+    ["transaction", "results"],
     ["recording"],
     ["parameters", "loads"],
     ["actuator", "faults", "waveforms"],
@@ -23,12 +23,14 @@ ROWS = [
     ["features"],
     ["logs"],
     ["simulate"],
+    ["experiment"],
     ["bench", "campaign", "calibrate", "compare", "session"],
     ["lowfit", "analysis", "benchmark", "compare_loads", "response", "environment"],
     ["diagnose"],
+    ["nexttest", "training"],
     ["prognose"],
-    ["reproduce"],
-    ["demo"],
+    ["reproduce", "doors"],
+    ["demo", "safety"],
     ["cli"],
     ["__main__"],
 ]
@@ -78,12 +80,60 @@ def test_imports_point_left(path):
         )
 
 
-@pytest.mark.parametrize("package", ["logs", "calibrate"])
+def test_the_package_knows_of_no_study():
+    """`studies` stands on the package and is not in the wheel."""
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            assert not {name.split(".")[0] for name in names} & {"studies", "tests"}, path
+
+
+@pytest.mark.parametrize("package", ["logs", "experiment", "estimate", "calibrate", "diagnose"])
 def test_logs_are_read_without_the_bench(package):
     """A real log has no bench of ours behind it: who reads logs knows of none."""
     for path in (PACKAGE / package).rglob("*.py"):
         packages = [other for other, _ in _imported(ast.parse(path.read_text(encoding="utf-8")))]
         assert "bench" not in packages, path.relative_to(PACKAGE)
+
+
+#: What runs a model: in the core, and of runs that are ready for it. Who may call it.
+RUNNERS = {
+    "simulate": {"simulate", "session", "experiment"},
+    "sensitivities": {"simulate", "session", "experiment"},
+    "Session": {"simulate", "session", "experiment"},
+    "simulate_prepared": {"simulate", "experiment", "campaign"},
+}
+
+
+def _core_calls(tree):
+    """Yield what of the core, or of runs ready for it, a module calls to run a model."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            if node.value.id == "_core" and node.attr in RUNNERS:
+                yield node.attr
+        elif isinstance(node, ast.ImportFrom):
+            names = {alias.name for alias in node.names}
+            if node.module == "elevon._core":
+                yield from names & RUNNERS.keys()
+            elif (node.module or "").startswith("elevon.simulate"):
+                yield from names & {"simulate_prepared"}
+
+
+def test_runs_of_the_core_are_seen():
+    text = "from elevon import _core\n_core.simulate()\nfrom elevon._core import Session\n"
+    assert set(_core_calls(ast.parse(text))) == {"simulate", "Session"}
+    assert set(_core_calls(ast.parse("_core.faults('rotary')"))) == set()
+
+
+def test_the_core_is_simulated_by_its_three_doors_only():
+    wrong = [
+        f"{path.relative_to(PACKAGE)}: {name}"
+        for path in MODULES
+        for name in _core_calls(ast.parse(path.read_text(encoding="utf-8")))
+        if _package(path) not in RUNNERS[name]
+    ]
+    assert wrong == []
 
 
 def _module_names():

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
+from elevon.calibrate.outcome import Calibration
 from elevon.cli import main
 from elevon.demo.life import run as life_run
 from elevon.demo.life.results import Statement
 from elevon.demo.life.unit import demo_mission
-from elevon.demo.results import Recovered
 from elevon.prognose import ResponseTables
 from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
 from elevon.prognose.requirement import Requirement
 from elevon.report import Report
+from tests.patches import put
 
 KEY = "backlash@transmission"
 
@@ -63,12 +64,10 @@ class Story:
             "elevon.demo.life.run.live": self.step("life", Life(usage, severity, 1500.0, 0)),
             "elevon.demo.life.run._log": self.log,
             "elevon.bench.run.run_procedure": self.bench,
-            "elevon.logs.importing.import_log": lambda path: path,
-            "elevon.calibrate.log.bench_log": lambda path: path,
+            "elevon.logs.read.read_drive_logs": lambda paths, **_options: paths,
             "elevon.calibrate.calibrate": self.calibrate,
             "elevon.calibrate.write.write_calibration": self.write,
             "elevon.prognose.respond": self.step("tables", tables()),
-            "elevon.diagnose.bymodel.read_test_logs": lambda paths: paths,
             "elevon.diagnose.bymodel.diagnose": self.diagnose,
             "elevon.demo.life.page.life_report": self.step("report", Report("life")),
             "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",
@@ -76,7 +75,7 @@ class Story:
             "elevon.report.figures.save_figure": lambda *_args, **_options: None,
         }
         for name, function in replaced.items():
-            monkeypatch.setattr(name, function)
+            put(monkeypatch, name, function)
 
     def step(self, name, result=None):
         def work(*_args, **_options):
@@ -100,7 +99,8 @@ class Story:
 
     def calibrate(self, _logs, base, **_options):
         self.step("calibration")()
-        return Recovered(base.with_values({"backlash.total": 0.001}, source="calibration"), (), ())
+        fitted = base.with_values({"backlash.total": 0.001}, source="calibration")
+        return Calibration(actuator=fitted, before=base, logs=(), parameters={})
 
     def write(self, path, _result, *, force):
         assert force

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.calibrate.estimate import Estimate
+from elevon.calibrate.outcome import Calibration, by_path
 from elevon.calibrate.validation import SIGNALS, ValidationTrace
 from elevon.demo import page
 from elevon.demo.page_parameters import errors_figure, parameters_section
-from elevon.demo.results import Recovered, Step
+from elevon.demo.results import Step
+from elevon.estimate import Estimate
 from elevon.report import Report
 
 
@@ -38,13 +39,17 @@ NOTES = {"derived.inertia": "all inertia on the motor shaft"}
 def demo():
     estimates = tuple(
         Estimate(
-            r["path"], r["value"], 1.0, (r["low"], r["high"]), r["unit"], "plant", r["before"],
-            note=NOTES.get(r["path"], ""), in_set=r["path"] not in NOTES,
+            r["value"], 1.0, interval=(r["low"], r["high"]), path=r["path"], unit=r["unit"],
+            register="plant", old=r["before"], note=NOTES.get(r["path"], ""),
+            in_set=r["path"] not in NOTES,
         )
         for r in ROWS
     )  # fmt: skip
     base = Actuator.load("torino-rotary")
-    return SimpleNamespace(base=base, calibration=Recovered(base, estimates, ("a finding",)))
+    calibration = Calibration(
+        actuator=base, before=base, logs=(), parameters=by_path(estimates), findings=("a finding",)
+    )
+    return SimpleNamespace(base=base, calibration=calibration)
 
 
 def section(demo, rows):

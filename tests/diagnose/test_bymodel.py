@@ -1,13 +1,12 @@
 """Diagnosis by the model on logs of the virtual bench."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.diagnose.bymodel import diagnose, read_test_logs
+from elevon.diagnose.bymodel import diagnose
 from elevon.diagnose.bymodel.candidates import CANDIDATES, chosen
 from elevon.diagnose.bymodel.case import case_of, detector_of
 from elevon.diagnose.bymodel.detection import Detector
@@ -15,6 +14,7 @@ from elevon.diagnose.bymodel.log import prepared
 from elevon.diagnose.bymodel.posterior import marginals, posterior, quantiles
 from elevon.diagnose.bymodel.replay import _RECENT, replay
 from elevon.errors import InputError, UnknownNameError
+from elevon.logs.read import read_logs
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
 
@@ -52,7 +52,7 @@ def unit():
 
 
 def answer(unit, path, *baselines, **options):
-    return diagnose(read_test_logs([path]), unit, baselines=read_test_logs(baselines), **options)
+    return diagnose(read_logs([path]), unit, baselines=read_logs(baselines), **options)
 
 
 def test_a_healthy_log_is_healthy(unit, logs):
@@ -91,7 +91,7 @@ def test_without_the_voltage_a_short_and_a_current_sensor_are_one_cause(unit):
     """Both scale one phase's share of the torque; only the EMF separates them."""
     pwm = unit.with_values({"drive.kind": "pwm"})
     made = bench_logs(pwm, [(1, []), (2, ["short@motor.phase_b=0.2"])])
-    base, log = (replace(item, voltage=None) for item in made)
+    base, log = (item.without("torque_voltage") for item in made)
     result = diagnose([log], pwm, baselines=[base])
     assert result.status == "faulty"
     cause = result.faults[0]
@@ -106,8 +106,31 @@ def test_without_the_voltage_a_short_and_a_current_sensor_are_one_cause(unit):
     assert ("bearing", "bearing.cage") in reasons
 
 
+@pytest.mark.parametrize("fidelity", ["low", pytest.param("high", marks=pytest.mark.long)])
+def test_an_eccentric_rotor_is_one_of_a_periodic_flux(unit, fidelity):
+    """Unless the actuator states its law: named by its own and by none other."""
+    pwm = unit.with_values({"drive.kind": "pwm"})
+    laws = {law: pwm.with_values({"motor.eccentricity_law": law}, request=False)
+            for law in ("periodic", "published")}  # fmt: skip
+    best = {}
+    for law, bench_unit in laws.items():
+        cases = [(1, []), (2, ["eccentricity_static@motor=0.1"])]
+        base, log = bench_logs(bench_unit, cases, fidelity=fidelity)
+        result = diagnose([log], pwm, baselines=[base])
+        best[law] = result.best
+        assert result.status == "faulty"
+        if law == "periodic":
+            low, high = result.faults[0].interval
+            assert low < 0.1 < high
+        else:
+            stated = diagnose([log], bench_unit, baselines=[base])
+            assert stated.best == ("eccentricity_static@motor",)
+    assert best["periodic"] == ("eccentricity_static@motor",)
+    assert best["published"] != ("eccentricity_static@motor",)
+
+
 def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs):
-    item = prepared(read_test_logs([logs["base"]])[0], unit)
+    item = prepared(read_logs([logs["base"]])[0], unit)
     turning = next(c for c in CANDIDATES if c.kind == "eccentricity_dynamic")
     sensor = next(c for c in CANDIDATES if c.place == "sensor.current_a")
     model = replay(item, unit, [turning, sensor])
@@ -136,7 +159,7 @@ def test_an_answer_does_not_depend_on_what_was_asked_before(unit, logs, baseline
 
 
 def test_the_runs_of_a_baseline_stand_about_the_logs_own_healthy_run(unit, logs):
-    item, base = (prepared(*read_test_logs([logs[n]]), unit) for n in ("healthy", "base"))
+    item, base = (prepared(*read_logs([logs[n]]), unit) for n in ("healthy", "base"))
     few = chosen(FEW)
     lent, direct, theirs = (
         replay(item, unit, few, [base]),
@@ -152,9 +175,9 @@ def test_the_runs_of_a_baseline_stand_about_the_logs_own_healthy_run(unit, logs)
 
 
 def test_what_moves_next_to_nothing_gives_the_detector_no_direction(unit, logs):
-    item = prepared(*read_test_logs([logs["healthy"]]), unit)
+    item = prepared(*read_logs([logs["healthy"]]), unit)
     every = chosen([*FEW, "sag@supply"])
-    case = case_of(item, unit, every, [], [])
+    case = case_of(item, unit, every, [])
     root = np.linalg.inv(np.linalg.cholesky(case.covariance))
     at = case.model.severities["sag@supply"][1:]
     size = np.linalg.norm(case.shift("sag@supply", at) @ root.T, axis=1)
@@ -198,8 +221,8 @@ def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
     """The page's signals: the healthy model misses the log's backlash, the named one does not."""
     from elevon.diagnose.bymodel.traces import traces_of
 
-    items = read_test_logs([logs["backlash"]])
-    result = diagnose(items, unit, baselines=read_test_logs([logs["base"]]), faults=FEW)
+    items = read_logs([logs["backlash"]])
+    result = diagnose(items, unit, baselines=read_logs([logs["base"]]), faults=FEW)
     (traces,) = traces_of(items, unit, result)
     gap = traces.panels[0]
     misses = [float(np.std(gap.log - line)) for line in (gap.healthy, gap.named)]
@@ -315,7 +338,8 @@ def test_severities_cover_what_was_drawn():
 )
 def test_on_the_high_model_with_another_drive(unit, tmp_path, fault, best):
     """Logs of the switching model with a PWM drive, diagnosed by the low one."""
-    pwm = {"fidelity": "high", "settings": ["drive.kind=pwm"]}
+    settings = ["drive.kind=pwm", "motor.eccentricity_law=periodic"]
+    pwm = {"fidelity": "high", "settings": settings}
     base = bench(tmp_path / "base", 50, **pwm)
     path = bench(tmp_path / "log", 51, *([fault] if fault else []), **pwm)
     result = answer(unit.with_values({"drive.kind": "pwm"}), path, base)

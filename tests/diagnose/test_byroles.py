@@ -1,5 +1,7 @@
 """Diagnosis of any actuator by the roles of its logs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,8 +15,9 @@ from elevon.diagnose.byroles.numbers import numbers_of
 from elevon.diagnose.byroles.role_test import same_test
 from elevon.diagnose.byroles.runs import spread_of
 from elevon.diagnose.byroles.spread import drawn, factors_of
-from elevon.diagnose.standard import Day, day_logs, diagnosed, standard_tests
 from elevon.errors import InputError, UnknownNameError
+from elevon.logs.log import Log
+from studies.fault_limits.standard import Day, day_logs, diagnosed, standard_tests
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 
@@ -29,7 +32,7 @@ def gear():
     return Actuator.load("pisa-landing-gear")
 
 
-def log(actuator, *faults, day=None, start=0.3):
+def log(actuator, *faults, day=None, start=0.3, name="log"):
     """A low-fidelity log: a sine, or an extension, that begins at `start`."""
     unit = actuator if day is None else drawn(actuator, np.random.default_rng(day))
     sine = {"kind": "sine", "amplitude": "20 mm", "frequency": "0.4 Hz", "start": start}
@@ -39,18 +42,21 @@ def log(actuator, *faults, day=None, start=0.3):
         command = {"mode": "gear", "steps": [{"time": start, "action": "extend"}]}
         names, seconds = "state,output_position,speed_meas,current_mean,proximity_25", 4
     scenario = Scenario.from_dict({"duration": seconds, "command": command, "fault": list(faults)})
-    return simulate(unit, scenario, fidelity="low", record=f"command,{names}@200 Hz")
+    record = f"command,{names}@200 Hz"
+    return Log.of(simulate(unit, scenario, fidelity="low", record=record), name)
 
 
 def test_backlash_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
     few = ["backlash@transmission", "gain_drift@control.position"]
-    base = [("base", log(screw, day=1))]
+    base = [log(screw, day=1, name="base")]
     healthy = diagnose_by_roles(
-        [("h", log(screw, day=2, start=0.41))], screw, baselines=base, faults=few
+        [log(screw, day=2, start=0.41, name="h")], screw, baselines=base, faults=few
     )
     assert healthy.status == "healthy"
     fault = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
-    worn = diagnose_by_roles([("w", log(screw, fault, day=3))], screw, baselines=base, faults=few)
+    worn = diagnose_by_roles(
+        [log(screw, fault, day=3, name="w")], screw, baselines=base, faults=few
+    )
     assert worn.status == "faulty"
     assert worn.best == ("backlash@transmission",)
     assert worn.faults[0].interval[0] < 4e-4 < worn.faults[0].interval[1]
@@ -59,11 +65,11 @@ def test_backlash_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
 
 def test_two_faults_of_a_screw_are_named_together(screw):
     few = ["backlash@transmission", "gain_drift@control.position", "short@motor.phase_a"]
-    base = [("base", log(screw, day=1))]
+    base = [log(screw, day=1, name="base")]
     backlash = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
     gain = {"kind": "gain_drift", "place": "control.position", "severity": -0.5}
     answer = diagnose_by_roles(
-        [("w", log(screw, backlash, gain, day=3))], screw, baselines=base, faults=few
+        [log(screw, backlash, gain, day=3, name="w")], screw, baselines=base, faults=few
     )
     assert set(answer.best) == {"backlash@transmission", "gain_drift@control.position"}
     low, high = next(c.interval for c in answer.faults if c.kind == "backlash")
@@ -104,44 +110,45 @@ def test_pairs_of_faults_are_named_with_the_whole_catalogue(name, title, pairs):
 
 def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
     few = ["sag@supply", "proximity_off@sensor.proximity_25", "release_cable_failed@release"]
-    base = [("base", log(gear, day=1))]
+    base = [log(gear, day=1, name="base")]
     late = diagnose_by_roles(
-        [("h", log(gear, day=2, start=0.7))], gear, baselines=base, faults=few, false_alarm=1e-3
+        [log(gear, day=2, start=0.7, name="h")], gear, baselines=base, faults=few, false_alarm=1e-3
     )
     assert late.status == "healthy"
     early = diagnose_by_roles(
-        [("h", log(gear, day=1, start=0.7))], gear, baselines=base, faults=few
+        [log(gear, day=1, start=0.7, name="h")], gear, baselines=base, faults=few
     )
-    assert max(abs(item.score) for item in early.moved) < 0.5  # its own day, begun later
+    assert max(abs(item.score) for item in early.features) < 0.5  # its own day, begun later
     blind = {(item["kind"], item["place"]): item["reason"] for item in late.unobservable}
     assert "moves nothing" in blind["release_cable_failed", "release"]
     dead = {"kind": "proximity_off", "place": "sensor.proximity_25", "severity": 1}
-    answer = diagnose_by_roles([("f", log(gear, dead, day=3))], gear, baselines=base, faults=few)
+    answer = diagnose_by_roles([log(gear, dead, day=3, name="f")], gear, baselines=base, faults=few)
     assert (answer.status, answer.best) == ("faulty", ("proximity_off@sensor.proximity_25",))
 
 
 def test_a_baseline_that_is_itself_faulty_is_left_out(screw):
     worn = {"kind": "friction", "place": "transmission", "severity": 5.0}
-    base = [("wrong", log(screw, worn, day=4)), ("right", log(screw, day=4))]
+    base = [log(screw, worn, day=4, name="wrong"), log(screw, day=4, name="right")]
     few = ["backlash@transmission", "gain_drift@control.position"]
     for baselines, named in ((base[:1], ["wrong"]), (base[1:], [])):
         result = diagnose_by_roles(
-            [("h", log(screw, day=2))], screw, baselines=baselines, faults=few
+            [log(screw, day=2, name="h")], screw, baselines=baselines, faults=few
         )
         left_out = [text for text in result.findings if "looks faulty" in text]
         assert [text.split()[1] for text in left_out] == named
 
 
 def test_a_log_is_read_from_its_first_command(screw, gear):
-    first, late = (role_log(log(screw, start=s), "a", screw) for s in (0.3, 0.412))
-    assert same_test(first.test, late.test)
-    short = min(first.test.seconds, late.test.seconds)
+    first, late = (role_log(log(screw, start=s), screw) for s in (0.3, 0.412))
+    assert same_test(first, late)
+    short = min(first.seconds, late.seconds)
     first, late = first.within(short), late.within(short)
-    np.testing.assert_allclose(first.time, late.time, atol=1e-12)
-    np.testing.assert_allclose(first.command, late.command, atol=8e-5)  # the kink at the start
-    extend = role_log(log(gear), "g", gear)
-    assert extend.test.command[0][-1] == pytest.approx(0.0, abs=1e-9)
-    assert extend.time[0] == pytest.approx(-0.1)
+    np.testing.assert_allclose(first.log.time, late.log.time, atol=1e-12)
+    commands = [item.log["command"] for item in (first, late)]
+    np.testing.assert_allclose(*commands, atol=8e-5)  # the kink at the start
+    extend = role_log(log(gear), gear)
+    assert extend.command[0][-1] == pytest.approx(0.0, abs=1e-9)
+    assert extend.log.time[0] == pytest.approx(-0.1)
 
 
 def test_a_ramp_is_seen_to_begin_between_two_samples(screw):
@@ -212,15 +219,15 @@ def test_spread_keeps_what_is_linear_and_gives_each_number_its_rest():
 def test_what_cannot_be_diagnosed_is_refused(screw):
     good = log(screw)
     with pytest.raises(InputError, match="role 'command'"):
-        role_log(good.select(["encoder_position"]), "x", screw)
+        role_log(replace(good, channels={"output_position": good.output}), screw)
     with pytest.raises(UnknownNameError):
-        diagnose_by_roles([("x", good)], screw, faults=["backlash@moon"])
+        diagnose_by_roles([good], screw, faults=["backlash@moon"])
     with pytest.raises(InputError, match="at least one"):
         diagnose_by_roles([], screw)
     idle = Scenario.from_dict({"duration": 2, "command": {"mode": "position"}})
     with pytest.raises(InputError, match="nothing is commanded"):
-        role_log(simulate(screw, idle, fidelity="low", record="command,encoder_position@200 Hz"),
-                 "x", screw)  # fmt: skip
+        run = simulate(screw, idle, fidelity="low", record="command,encoder_position@200 Hz")
+        role_log(Log.of(run, "x"), screw)
 
 
 @pytest.mark.parametrize("name", ["nasa-ballscrew", "pisa-landing-gear", "torino-rotary"])
@@ -237,7 +244,7 @@ def test_every_fault_is_a_candidate_or_not_modelled_with_a_reason(name):
 
 def test_the_command_line(screw, tmp_path, capsys):
     path = tmp_path / "log.csv"
-    log(screw, day=5).save(path)
+    log(screw, day=5).recording.save(path)
     code = main(["diagnose", str(path), "--actuator", "nasa-ballscrew", "--fault",
                  "backlash@transmission", "--json",
                  "--report", str(tmp_path / "page.html")])  # fmt: skip
@@ -250,7 +257,7 @@ def test_the_command_line(screw, tmp_path, capsys):
     assert main(["diagnose", str(path), *options]) == 2
 
 
-def loaded_log(actuator, compliance, *faults, seconds=3.0, day=1, force=1500.0):
+def loaded_log(actuator, compliance, *faults, seconds=3.0, day=1, force=1500.0, name="s"):
     """A sine against 1500 N; the output deflects by `compliance` times load over stiffness."""
     unit = drawn(actuator, np.random.default_rng(day))
     grid = np.arange(0.0, 4.0, 0.01)
@@ -274,32 +281,32 @@ def loaded_log(actuator, compliance, *faults, seconds=3.0, day=1, force=1500.0):
         columns[role] = channel.values - (back if role == "output_position" else 0.0)
         units[role], roles[role] = channel.unit, role
     columns["load"], units["load"], roles["load"] = load, "N", "load"
-    return Recording.build(time, columns, units, meta={"roles": roles})
+    return Log.of(Recording.build(time, columns, units, meta={"roles": roles}), name)
 
 
 def test_a_screw_that_gives_under_its_load_is_healthy_and_its_backlash_is_seen(screw):
     few = ["backlash@transmission", "gain_drift@control.position"]
-    base = [("base", loaded_log(screw, 1.0))]
+    base = [loaded_log(screw, 1.0, name="base")]
     healthy = diagnose_by_roles(
-        [("h", loaded_log(screw, 1.0, day=2))], screw, baselines=base, faults=few
+        [loaded_log(screw, 1.0, day=2, name="h")], screw, baselines=base, faults=few
     )
     assert (healthy.status, healthy.findings) == ("healthy", ())  # its baseline is not left out
     backlash = {"kind": "backlash", "place": "transmission", "severity": "60 um"}
     worn = diagnose_by_roles(
-        [("w", loaded_log(screw, 1.0, backlash, day=3))], screw, baselines=base, faults=few
+        [loaded_log(screw, 1.0, backlash, day=3, name="w")], screw, baselines=base, faults=few
     )
     assert worn.best == ("backlash@transmission",)
     assert worn.faults[0].interval[0] < 6e-5 < worn.faults[0].interval[1]
-    stiff = [("s", loaded_log(screw, 0.0))]  # its stiffness is uncertain by its own size
+    stiff = [loaded_log(screw, 0.0, name="s")]  # its stiffness is uncertain by its own size
     assert diagnose_by_roles(stiff, screw, baselines=stiff, faults=few).findings == ()
-    soft = [("s", loaded_log(screw, 8.0))]
-    driven = [("d", loaded_log(screw, -1.0, force=-1500.0))]
+    soft = [loaded_log(screw, 8.0, name="s")]
+    driven = [loaded_log(screw, -1.0, force=-1500.0, name="d")]
     answer = diagnose_by_roles(driven, screw, baselines=driven, faults=few)
     assert any("drives the output" in finding for finding in answer.findings)
     assert "looks faulty" in diagnose_by_roles(soft, screw, baselines=soft, faults=few).findings[-1]
 
 
 def test_a_baseline_may_go_on_for_longer_than_the_log(screw):
-    short, long = (role_log(loaded_log(screw, 1.0, seconds=s), "s", screw).test for s in (1.5, 3.0))
+    short, long = (role_log(loaded_log(screw, 1.0, seconds=s), screw) for s in (1.5, 3.0))
     assert same_test(short, long)
     assert not same_test(long, short)

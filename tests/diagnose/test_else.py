@@ -15,9 +15,9 @@ from elevon.diagnose.bymodel.replay import Replay
 from elevon.diagnose.bymodel.words import sentence
 from elevon.errors import InputError
 from elevon.faults import catalogue
-from elevon.reproduce.diagnosis_limits.campaign import calibrated
-from elevon.reproduce.diagnosis_limits.logs import Trial, bench_logs
-from elevon.reproduce.diagnosis_limits.unit import draw_unit
+from studies.diagnosis_limits.campaign import calibrated
+from studies.diagnosis_limits.logs import Trial, bench_logs
+from studies.diagnosis_limits.unit import draw_unit
 
 NAMES = ("lost_motion", "dry_current", "viscous_current", "voltage_order_1", "speed_gain")
 BACKLASH = next(c for c in CANDIDATES if c.kind == "backlash")
@@ -49,16 +49,16 @@ def test_each_fault_of_the_catalogue_is_candidate_ambiguous_or_not_modelled_once
 
 def test_something_else_is_distinguished_from_the_candidates():
     base = [[1.0] * 5]
-    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05, [], other=True)
+    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05, other=True)
     assert (other.status, other.best) == ("faulty", ())
     assert other.p_other > 0.9
     assert other.p_fault > 0.9
     assert "none of the candidates" in sentence(other)
     assert any("no candidate explains" in text for text in other.findings)
-    backlash = answer_of([_case([1.5, 1, 1, 1, 1], base)], [BACKLASH], 0.05, [], other=True)
+    backlash = answer_of([_case([1.5, 1, 1, 1, 1], base)], [BACKLASH], 0.05, other=True)
     assert backlash.best == (BACKLASH.key,)
     assert backlash.p_other < 0.01
-    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [BACKLASH], 0.05, [], other=True)
+    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [BACKLASH], 0.05, other=True)
     assert well.status == "healthy"
     assert well.p_other < 0.01
 
@@ -110,6 +110,9 @@ CLEAR = {
     "gain@sensor.encoder": 0.01, "missing_counts@sensor.encoder": 0.1,
     "dark_sectors@sensor.encoder": 0.1, "resolver_short@sensor.resolver.sine": 0.1,
     "resolver_short@sensor.resolver.excitation": 0.3, "resolver_open@sensor.resolver.sine": 1.0,
+    "quadrature@sensor.resolver": 0.05, "channel_offset@sensor.resolver.sine": 0.05,
+    "channel_offset@sensor.resolver.cosine": 0.05, "interpolation@sensor.encoder.first": 0.1,
+    "interpolation@sensor.encoder.second": 0.1,
     "stuck@sensor.resolver": 1.0, "stuck@sensor.encoder": 1.0, "stuck@sensor.current_a": 1.0,
     "dead@sensor.encoder": 1.0, "dead@sensor.current_a": 1.0,
 }  # fmt: skip

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from elevon.calibrate.backlash import through_backlash
-from elevon.diagnose.bymodel.features import DriveSignals, features_of
+from elevon.diagnose.bymodel.features import features_of
+from elevon.logs.log import Log
 
 RATIO, BACKLASH = 124.0, 0.009
 TIME = np.arange(0.0, 20.0, 0.0025)
@@ -16,21 +17,11 @@ def features_with(output):
     speed = np.gradient(motor, TIME)
     count = 2.0 * np.pi / 80_000
     position = np.floor(output(motor / RATIO) / count) * count
-    flat, good = np.zeros_like(TIME), np.ones(len(TIME), dtype=bool)
-    signals = DriveSignals(
-        TIME,
-        position,
-        motor,
-        speed,
-        speed,
-        flat + 1.0,
-        np.sign(speed),
-        None,
-        None,
-        None,
-        None,
-        good,
-    )
+    channels = {
+        "output_position": position, "motor_position": motor, "speed_ref": speed,
+        "motor_speed": speed, "current_ref": np.ones_like(TIME), "torque_current": np.sign(speed),
+    }  # fmt: skip
+    signals = Log("sine", TIME, channels)
     return features_of(signals, ratio=RATIO, pole_pairs=4.0, emf=1.0)
 
 

@@ -4,17 +4,16 @@ import json
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from elevon import Actuator
 from elevon.bench.procedure import Procedure
 from elevon.bench.rig import setups
 from elevon.bench.traces import recorded
+from elevon.bench.virtual import traced
 from elevon.diagnose.monitor import Monitor
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 from elevon.diagnose.monitor.threshold import simulated
 from elevon.diagnose.monitor.windows import CHANNELS
-from elevon.diagnose.virtual import traced
 from elevon.errors import InputError
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
@@ -141,9 +140,9 @@ def test_samples_fed_in_any_portions_say_what_the_log_says(monitor, streams):
     whole = monitor.fresh()
     whole.feed_log(item)
     fed = monitor.fresh()
-    samples = {"time": item.log.time, "voltage_q_ref": item.voltage}
-    samples |= {name: getattr(item.log, field) for name, field in CHANNELS.items()}
-    for part in np.array_split(np.arange(len(item.log.time)), 7):
+    samples = {"time": item.time, "voltage_q_ref": item["torque_voltage"]}
+    samples |= {name: item[role] for name, role in CHANNELS.items()}
+    for part in np.array_split(np.arange(len(item.time)), 7):
         fed.feed({name: values[part] for name, values in samples.items()})
     count = len(fed.steps)
     assert count >= len(whole.steps) - 1
@@ -151,7 +150,7 @@ def test_samples_fed_in_any_portions_say_what_the_log_says(monitor, streams):
         [s.statistic for s in whole.steps[:count]], rel=1e-6
     )
     with pytest.raises(InputError, match="current_q_meas"):
-        fed.feed({"time": item.log.time})
+        fed.feed({"time": item.time})
 
 
 def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
@@ -166,23 +165,19 @@ def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
 
 
 def test_windows_begin_a_second_after_the_motion_has(streams):
-    from dataclasses import replace
-
     from elevon.diagnose.monitor.windows import run_in, top_speed
 
     item = streams["healthy"]
     top = top_speed(item)
-    rests = replace(item, log=replace(item.log, speed=np.where(item.log.time < 2.0, 0.0, top)))
-    assert run_in(rests, top) == pytest.approx(3.0, abs=item.log.period)
-    standing = replace(item, log=replace(item.log, speed=0.0 * item.log.speed))
+    rests = item.with_channels(motor_speed=np.where(item.time < 2.0, 0.0, top))
+    assert run_in(rests, top) == pytest.approx(3.0, abs=item.period)
+    standing = item.with_channels(motor_speed=0.0 * item.speed)
     assert run_in(standing, top) is None
 
 
 def test_another_motion_is_left_out(monitor, streams):
-    from dataclasses import replace
-
     item = streams["healthy"]
-    faster = replace(item, log=replace(item.log, output=1.5 * item.log.output))
+    faster = item.with_channels(output_position=1.5 * item.output)
     steps = monitor.fresh().feed_log(faster)
     assert {step.skipped for step in steps} == {"not the baselines' motion"}
 
@@ -210,33 +205,3 @@ def test_the_command(elevon_cli, tmp_path):  # noqa: F811
     refused = elevon_cli("monitor", logs[1], *options, "--false-alarm-time", "0 s", "--json")
     assert refused.code == 2
     assert refused.out == ""
-
-
-def test_the_rate_of_false_alarms_has_an_exact_interval():
-    from elevon.reproduce.monitor_delay import LENGTH, _rate
-
-    low, high = _rate(3, 36)
-    hours = 36 * LENGTH / 3600.0
-    assert chi2.sf(2 * low * hours, 6) == pytest.approx(0.975)
-    assert chi2.cdf(2 * high * hours, 8) == pytest.approx(0.975)
-    assert _rate(0, 36)[0] == 0.0
-
-
-def test_the_plan_of_streams():
-    from elevon.reproduce.monitor_delay import HEALTHY, LEVELS, MonitorDelay, Watched, _plan
-
-    plan = [item for unit in range(3) for item in _plan(1, unit)]
-    assert len({item.trial.seed for item in plan}) == len(plan) == 3 * (HEALTHY + 5 * len(LEVELS))
-    watched = tuple(
-        Watched(p.trial.name, 0, p.fault.kind if p.fault else "", p.level, 0.0, False,
-                4.0 if p.fault and p.level > 0.1 else None, bool(p.fault), False)
-        for p in plan
-    )  # fmt: skip
-    result = MonitorDelay(1, 3, 5.0, watched)
-    document = json.loads(json.dumps(result.to_dict()))
-    assert document["status"] == "pass"
-    assert sum(row["streams"] for row in document["rows"]) + document["healthy_streams"] == len(
-        plan
-    )
-    missed = [row for row in document["rows"] if row["alarms"] == 0]
-    assert len(missed) == 5 * sum(level <= 0.1 for level in LEVELS)

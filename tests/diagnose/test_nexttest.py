@@ -1,19 +1,17 @@
 """Which test to run next."""
 
 import json
-from itertools import permutations
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.nexttest import Belief, Possible, next_test, profiles
-from elevon.diagnose.nexttest.belief import read_result
-from elevon.diagnose.nexttest.information import expected_information, planned, updated
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.errors import FormatError, InputError
+from elevon.nexttest import Belief, Possible, next_test, profiles
+from elevon.nexttest.belief import read_result
+from elevon.nexttest.information import expected_information, planned, updated
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
@@ -149,7 +147,7 @@ def test_a_file_that_is_no_result(tmp_path):
 
 
 def test_the_command_line(elevon_cli, monkeypatch, tmp_path):  # noqa: F811
-    from elevon.diagnose.nexttest import choose
+    from elevon.nexttest import choose
 
     monkeypatch.setattr(choose, "profiles", lambda: profiles()[::2][:2])  # fewer: seconds each
     path = tmp_path / "r.json"
@@ -162,29 +160,3 @@ def test_the_command_line(elevon_cli, monkeypatch, tmp_path):  # noqa: F811
     assert document["next"] == document["tests"][0]
     assert 0.0 < bits[0] < document["unknown_bit"] + 0.1
     assert elevon_cli("next-test", "--actuator", "torino-rotary", "--so-far", tmp_path).code == 2
-
-
-def test_fixed_orders_are_counted_as_they_would_be_run(monkeypatch):
-    """By a table of log odds: the order of the list and the mean over all orders, by hand."""
-    from elevon.reproduce import next_test as module
-
-    odds = {(0, 0): 1.0, (1, 0): 4.0, (2, 0): 0.5, (0, 1): 1.0, (1, 1): -9.0, (2, 1): 0.5}
-    unit = object.__new__(module._Unit)
-    unit._pair, unit._truth, unit._bench = "p", 1, SimpleNamespace(cases=[0, 1, 2])
-    monkeypatch.setattr(module._Unit, "odds", lambda _, k, r: odds.get((k, r), 0.0))
-    tests, certain, right = unit.by_orders()
-    # Sure with the second test of the list, wherever it stands: first, second or third.
-    orders = list(permutations(range(3)))
-    assert tests.tolist() == [order.index(1) + 1.0 for order in orders]
-    assert certain.all()
-    assert right.all()
-    assert unit.mean_of_orders(tests, certain, right).tests == pytest.approx(2.0)
-
-
-@pytest.mark.long
-def test_information_beats_fixed_orders(elevon_cli):  # noqa: F811
-    result = elevon_cli("reproduce", "next-test", "--json")
-    document = json.loads(result.out)
-    assert document["status"] == "pass", document["checks"]
-    rows = {r["strategy"]: r["tests"] for r in document["rows"] if r["pair"] == "all"}
-    assert rows["information"] < document["best_fixed_order"]["tests"] < rows["orders"]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from elevon.actuator import Actuator
-from elevon.diagnose.bymodel import read_test_logs
 from elevon.diagnose.bymodel.log import prepared
+from elevon.logs.read import read_log
 from elevon.scenario import Scenario
 from elevon.simulate import simulate
 
@@ -26,9 +26,9 @@ def test_its_command_is_known_without_a_note(tmp_path, terms):
     scenario = Scenario.from_dict({"duration": 8, "command": {"mode": "position", "terms": terms}})
     recording = simulate(unit, scenario, fidelity="low", record=f"{SIGNALS},command@400 Hz")
     recording.save(path)
-    item = prepared(read_test_logs([path])[0], unit)
+    item = prepared(read_log(path), unit)
     assert item.gain[0] == pytest.approx(unit.parameters.value("control.position_gain"), rel=5e-3)
-    command = np.interp(item.log.time, recording["command"].time, recording["command"].values)
+    command = np.interp(item.time, recording["command"].time, recording["command"].values)
     # Within one sample's motion: the instant at which the command began is fitted to the log.
     step = float(np.abs(np.diff(command)).max())
-    assert np.abs(item.replay - command)[item.good].max() < step
+    assert np.abs(item["command"] - command)[item.good].max() < step

@@ -32,7 +32,7 @@ def frames():
     out = {}
     for (name, texts), item in zip(FAULTS.items(), made[1:], strict=True):
         few = [KNOWN[text.partition("=")[0]] for text in texts]
-        case = case_of(prepared(item, unit), unit, CANDIDATES, [base], [])
+        case = case_of(prepared(item, unit), unit, CANDIDATES, [base])
         residual = case.features.values - case.unit.mean
         frame = Frame(
             residual, case.covariance, case.unit.degrees, case.shift, case.errors, case.uncertainty

@@ -8,16 +8,14 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.features import UNITS, DriveSignals, features_of, median
+from elevon.diagnose.bymodel.features import UNITS, features_of, median
 from elevon.diagnose.bymodel.lost_motion import carried
-from elevon.diagnose.nexttest.belief import Answered
 from elevon.diagnose.surrogate import (
     Surrogate,
     diagnose_by_both,
     diagnose_by_surrogate,
     shipped,
 )
-from elevon.diagnose.surrogate.campaign import SINGLE_FAULTS, _Plan, _unit_runs
 from elevon.diagnose.surrogate.features import NAMES, changes, log_features
 from elevon.diagnose.surrogate.population import (
     FAULTS,
@@ -28,9 +26,13 @@ from elevon.diagnose.surrogate.population import (
     unit_of,
 )
 from elevon.diagnose.surrogate.sampling import severities, sizes
+from elevon.diagnose.surrogate.table import SINGLE_FAULTS
 from elevon.errors import FormatError, InputError
-from elevon.prognose.history import _KEYS, _OF_DIAGNOSIS
+from elevon.logs.brake import Brake
+from elevon.nexttest.belief import Answered
+from elevon.prognose.history import known_keys
 from elevon.simulate.acting import check_values
+from elevon.training.campaign import _Plan, _unit_runs
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
 
@@ -73,11 +75,7 @@ def test_features_are_the_evidence_and_the_position_gain(unit, logs):
 
 def test_evidence_without_deviations_is_the_same(unit, logs):
     """The surrogate and the model's runs need the numbers alone; they must be the same ones."""
-    log = logs["short"].log
-    signals = DriveSignals(
-        log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target, log.current,
-        logs["short"].voltage, None, None, (150.0, 1.0), log.good,
-    )  # fmt: skip
+    signals = replace(logs["short"], gain=(150.0, 1.0), brake=Brake.none())
     value = unit.parameters.value
     about = {"ratio": value("gear.ratio"), "pole_pairs": value("motor.pole_pairs"), "emf": 1.0}
     whole = features_of(signals, **about)
@@ -145,8 +143,8 @@ def test_sets_of_faults_share_the_probability(unit, logs):
         assert shares == sorted(shares, reverse=True)
         assert sum(shares) == pytest.approx(1.0, abs=0.05)
         first = result.hypotheses[0]
-        assert [f"{kind}@{place}" for kind, place, _ in first.faults] == list(result.best)
-        assert first.interval[0][0] < first.severity[0] < first.interval[0][1]
+        assert [f"{f.kind}@{f.place}" for f in first.faults] == list(result.best)
+        assert first.faults[0].interval[0] < first.faults[0].severity < first.faults[0].interval[1]
         answered = Answered.of(json.loads(json.dumps(result.to_dict())))
         assert answered.possible[result.best].weight == shares[0]
 
@@ -154,12 +152,12 @@ def test_sets_of_faults_share_the_probability(unit, logs):
 def test_a_history_takes_what_a_diagnosis_says(unit, logs):
     """`elevon predict` refuses keys that it does not know; a diagnosis must have none."""
     findings = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]]).to_dict()
-    assert set(findings) <= _KEYS | _OF_DIAGNOSIS
+    assert set(findings) <= known_keys()
 
 
 def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):
     one = diagnose_by_surrogate([logs["short"]], unit, baselines=[logs["base"]])
-    again = replace(logs["short"], log=replace(logs["short"].log, name="again"))
+    again = replace(logs["short"], name="again")
     two = diagnose_by_surrogate([logs["short"], again], unit, baselines=[logs["base"]])
     width = [r.faults[0].interval[1] - r.faults[0].interval[0] for r in (one, two)]
     assert width[1] < width[0]
@@ -168,7 +166,7 @@ def test_two_logs_of_a_unit_are_surer_than_one(unit, logs):
 
 def test_a_faulty_baseline_is_named(unit, logs):
     def named(item, name):
-        return replace(item, log=replace(item.log, name=name))
+        return replace(item, name=name)
 
     healthy = [logs["base"], logs["healthy"]]  # of one name, as files of two folders are
     faulty = named(logs["backlash"], "third")
@@ -188,9 +186,7 @@ def test_what_was_not_trained_is_said(unit, logs):
     assert any("outside the training set" in text for text in result.findings)
     with pytest.raises(InputError, match="not trained on such a test"):
         diagnose_by_surrogate(bench_logs(unit, [(1, [])], procedure="chirp"), unit)
-    without = replace(
-        logs["backlash"], log=replace(logs["backlash"].log, current_signal="current_ref")
-    )
+    without = logs["backlash"].without("torque_current")
     with pytest.raises(InputError, match="r78"):
         diagnose_by_surrogate([without], unit)
 
@@ -205,16 +201,13 @@ def test_a_unit_unlike_the_trained_ones_is_said():
     assert any("unit whose healthy dry_current" in text for text in findings)
     plain = Actuator.load("torino-rotary")
     cases = bench_logs(plain, [(1, []), (2, [])], procedure="loaded")
-    bare = [
-        replace(item, log=replace(item.log, brake=replace(item.log.brake, known="on")))
-        for item in cases
-    ]
+    bare = [replace(item, brake=replace(item.brake, known="on")) for item in cases]
     with pytest.raises(InputError, match="not trained on such a test"):
         diagnose_by_surrogate(bare[:1], plain, baselines=bare[1:])
 
 
 def test_a_log_without_voltage_is_still_read(unit, logs):
-    without = replace(logs["backlash"], voltage=None)
+    without = logs["backlash"].without("torque_voltage")
     result = diagnose_by_surrogate([without], unit, baselines=[logs["base"]])
     assert result.best == (FAULTS[0],)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from elevon.diagnose.surrogate import shipped
-from elevon.diagnose.surrogate.campaign import SINGLE_FAULTS, TrainingTable
 from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.fit import TrainingPlan, fitted
 from elevon.diagnose.surrogate.judge import judged, judged_at
@@ -20,6 +19,7 @@ from elevon.diagnose.surrogate.network import (
 )
 from elevon.diagnose.surrogate.population import FAULTS, drawn_faults, learned
 from elevon.diagnose.surrogate.sampling import Rows, sizes
+from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 

@@ -21,7 +21,7 @@ def named(kind, place, unit="1", severity=0.2):
     return Diagnosis(
         logs=("a.csv",), status="faulty", p_fault=0.99, false_alarm=0.05, chance=0.001,
         faults=(cause,), best=(f"{kind}@{place}",), p_best=0.98, unobservable=(), detectable={},
-        moved=(), findings=(), seconds=0.0,
+        features=(), findings=(), seconds=0.0,
     )  # fmt: skip
 
 

@@ -121,3 +121,24 @@ def test_campaign_plan(tmp_path):
         main(["campaign", "run", str(EXAMPLES / "campaign.toml"), "--out", str(tmp_path / "runs")])
         == 0
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "status", "code"),
+    [
+        ("interruption-50ms", "ok", 0.0),
+        ("surge", "ok", 0.0),
+        ("interruption-200ms", "tripped", 14.0),
+        ("dip", "tripped", 0.0),
+    ],
+)
+def test_transients_of_the_landing_gears_supply(name, status, code, tmp_path, capsys):
+    """Each ends locked; what ended a motion stands in the message."""
+    path = EXAMPLES / "landing-gear" / f"{name}.toml"
+    assert main(["simulate", "pisa-landing-gear", "--scenario", str(path), "--fidelity", "low",
+                 "--json"]) == 0  # fmt: skip
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["status"] == status
+    assert answer["final"]["locked"] == 1.0
+    assert answer["final"]["fault_code"] == code
+    assert ("extend" in (answer["message"] or "")) is (status == "tripped")

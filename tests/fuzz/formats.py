@@ -163,7 +163,7 @@ def _write_result(folder: Path, rng: np.random.Generator) -> Path:
 
 
 def _read_result(path: Path) -> object:
-    from elevon.diagnose.nexttest.belief import Belief, read_result
+    from elevon.nexttest.belief import Belief, read_result
 
     return Belief.after([read_result(path)])
 
@@ -244,10 +244,10 @@ def _cell(cell: Any) -> str:
 
 
 def _read_log(path: Path) -> object:
-    from elevon.calibrate.log import bench_log
-    from elevon.logs.importing import import_log
+    from elevon.logs.drive import drive_log
+    from elevon.logs.read import read_log
 
-    return bench_log(import_log(path))
+    return drive_log(read_log(path))
 
 
 # A data set's manifest

@@ -6,35 +6,71 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
+from elevon.worklog import LOCK
 from tests.harness.readable import readable
 from tests.harness.recipes import Recipe
 
 LIMIT = 240.0
-"""Seconds after which a run counts as hung."""
+"""Seconds of processor time after which a run counts as hung; ten times as long by the clock."""
 
 #: What is no result: hidden files (temporary ones, locks, staged ones).
 _HIDDEN = re.compile(r"(^|/)\.[^/]")
+#: The random part of a temporary file's name.
+_RANDOM = re.compile(r"(?<=\.)[0-9a-f]{12}(?=\.part)")
 FOREIGN = "must stay as it is\n"
 
 
 @dataclass
 class Counts:
-    """What was tried and what came of it."""
+    """What was tried and what came of it.
 
-    runs: int = 0
-    old: int = 0
-    new: int = 0
-    between: int = 0
+    Attributes
+    ----------
+    points : int
+        System calls of the command that change a file below its folder.
+    tried : Counter
+        Runs of each mode: ``kill``, ``torn``, ``full``, ``two``.
+    kinds : Counter
+        Runs after which the folder was the ``old`` one, the ``new`` one or one ``between``.
+    repaired : int
+        Runs after which the command named for it made the folder that of a whole run.
+    foreign : int
+        Runs after which a file that is none of the command's had changed.
+    faults : list of str
+        What must not be.
+    """
+
+    points: int = 0
+    tried: Counter = field(default_factory=Counter)
+    kinds: Counter = field(default_factory=Counter)
     repaired: int = 0
+    foreign: int = 0
     faults: list = field(default_factory=list)
 
-    def __str__(self):
-        return (f"{self.runs} runs: {self.old} old, {self.new} new, {self.between} between, "
-                f"{self.repaired} repaired, {len(self.faults)} faults")  # fmt: skip
+    @property
+    def row(self):
+        """The line of a table below `HEAD`."""
+        tried = [self.tried[mode] for mode in ("kill", "torn", "full", "two")]
+        kinds = [self.kinds[kind] for kind in ("old", "new", "between")]
+        return [self.points, *tried, *kinds, self.repaired, self.foreign, len(self.faults)]
+
+
+HEAD = ("points", "kills", "torn", "full", "two", "old", "new", "between", "repaired", "foreign",
+        "faults")  # fmt: skip
+
+
+def table(rows):
+    """Return a table of counts: one command a line, and their sum."""
+    rows = {**rows, "all": [sum(column) for column in zip(*rows.values(), strict=True)]}
+    width = max(len(name) for name in rows)
+    lines = [" " * width + "".join(f"{name:>9}" for name in HEAD)]
+    lines += [name.ljust(width) + "".join(f"{n:9d}" for n in row) for name, row in rows.items()]
+    return "\n".join(lines)
 
 
 class Driver:
@@ -100,11 +136,15 @@ class Driver:
 
     def state(self):
         """Return the hash of every visible file."""
-        return {
-            name: hashlib.sha256(path.read_bytes()).hexdigest()
-            for path in sorted(self.root.rglob("*"))
-            if path.is_file() and not _HIDDEN.search(name := path.relative_to(self.root).as_posix())
-        }
+        return {name: mark for name, mark in self.everything() if not _HIDDEN.search(name)}
+
+    def everything(self):
+        """Return name and hash of every file but locks, which hold a process number."""
+        return frozenset(
+            (path.relative_to(self.root).as_posix(), hashlib.sha256(path.read_bytes()).hexdigest())
+            for path in self.root.rglob("*")
+            if path.is_file() and path.name != LOCK
+        )
 
 
 class Trial:
@@ -112,6 +152,7 @@ class Trial:
 
     def __init__(self, driver, name, recipe):
         self.driver, self.recipe, self.counts = driver, recipe, Counts()
+        self.mended = {}
         self.command = (*name.split(), *recipe.words)
         self.repair = recipe.repair or self.command
         driver.prepare(recipe)
@@ -119,6 +160,7 @@ class Trial:
         ((self.code, error, self.points),) = driver.run(self.command)
         assert self.code in recipe.code, (self.command, self.code, error)
         self.after = driver.state()
+        self.counts.points = len(self.points)
         driver.restore()
         driver.run(self.command)
         again = driver.state()
@@ -133,30 +175,30 @@ class Trial:
         for at in places:
             self.driver.restore()
             ((code, error, _),) = self.driver.run(self.command, mode=mode, at=at)
-            self._judge(
-                f"{mode} at {self.points[at - 1]}{at}", [code], error, killed=mode != "full"
-            )
+            self._judge(mode, f"{self.points[at - 1]}{at}", [code], error)
 
     def at_once(self):
         """Run the command twice at the same time."""
         self.driver.restore()
         ran = self.driver.run(self.command, self.command)
         errors = "\n".join(error for _, error, _ in ran)
-        self._judge("two at once", [code for code, _, _ in ran], errors)
+        self._judge("two", "once", [code for code, _, _ in ran], errors)
 
-    def _judge(self, what, codes, error, killed=False):
-        self.counts.runs += 1
+    def _judge(self, mode, place, codes, error):
+        self.counts.tried[mode] += 1
+        killed = mode in {"kill", "torn"}
         wrong = self._wrong(codes, error, killed)
         state = self.driver.state()
         kind = self._kind(state)
-        setattr(self.counts, kind, getattr(self.counts, kind) + 1)
+        self.counts.kinds[kind] += 1
         if kind != "new" and not killed and any(code in self.recipe.code for code in codes):
             wrong.append(f"exit {codes}, yet the folder is {kind}: {self._difference(state)}")
-        wrong += self._torn(state)
+        wrong += self._torn(state) + self._foreign()
         if not wrong and not self.recipe.reads:
-            wrong += self._unrepaired()
+            wrong += self._mended_once()
         if wrong:
-            self.counts.faults.append(f"{' '.join(self.command)}: {what}: {'; '.join(wrong)}")
+            words = " ".join(self.command)
+            self.counts.faults.append(f"{words}: {mode} at {place}: {'; '.join(wrong)}")
 
     def _wrong(self, codes, error, killed):
         wrong = ["Traceback: " + error.strip().splitlines()[-1]] if "Traceback" in error else []
@@ -192,10 +234,24 @@ class Trial:
             and not readable(self.driver.root / name)
         ]  # fmt: skip
         gone = [name for name in self.before if name not in state and name in self.after]
-        places = [self.driver.outside / "foreign.txt", *self.driver.root.rglob("foreign.txt")]
-        foreign = [path.name for path in places if path.read_text() != FOREIGN]
-        findings = {"torn": torn, "gone": gone, "foreign files changed": foreign}
-        return [f"{text}: {names}" for text, names in findings.items() if names]
+        return [f"{text}: {names}" for text, names in {"torn": torn, "gone": gone}.items() if names]
+
+    def _foreign(self):
+        """Files that are none of the command's, and are not as they were."""
+        kept = (path.relative_to(self.driver.folder / "before")
+                for path in (self.driver.folder / "before").rglob("foreign.txt"))  # fmt: skip
+        places = [self.driver.outside / "foreign.txt", *(self.driver.root / path for path in kept)]
+        changed = [str(p) for p in places if not p.is_file() or p.read_text() != FOREIGN]
+        self.counts.foreign += bool(changed)
+        return [f"foreign files changed: {changed}"] if changed else []
+
+    def _mended_once(self):
+        """Repair; a folder that is to the byte one that was repaired before is not tried again."""
+        whole = frozenset((_RANDOM.sub("x", name), mark) for name, mark in self.driver.everything())
+        if whole not in self.mended:
+            self.mended[whole] = self._unrepaired()
+        self.counts.repaired += not self.mended[whole]
+        return self.mended[whole]
 
     def _unrepaired(self):
         ((code, error, _),) = self.driver.run(self.repair)
@@ -210,7 +266,6 @@ class Trial:
                 state = self.after
         if not self._same(state, self.after):
             return [f"not repaired: {self._difference(state)} {error[-200:]}"]
-        self.counts.repaired += 1
         return []
 
 
@@ -237,4 +292,25 @@ def _put(root, name, text):
         folder(root / name, serial=[name] * 4)
         (root / "mission.toml").write_text(tomlkit.dumps(FLIGHT))
         return
+    elif text == "@inspections":
+        _put_inspections(root / name)
+        return
     (root / name).write_text(text)
+
+
+def _put_inspections(folder):
+    """Note inspections of two units as finished, but one; each row says what was true."""
+    from elevon.worklog import finished
+    from studies.inspection_error.campaign import Inspected
+    from studies.inspection_error.plan import visits
+
+    with finished(folder, "inspection-error seed 0") as log:
+        of_level = {}
+        for unit, visit in [(k, visit) for k in range(2) for visit in visits(0, k)]:
+            row = Inspected(visit.name, unit, visit.law, visit.level, visit.severity, 1, 1.0,
+                            1.01 * visit.severity, 0.1 * visit.severity, 0.1 * visit.severity,
+                            0.01, ())  # fmt: skip
+            of_level.setdefault((unit, visit.law, visit.level), []).append(row.to_dict())
+        del of_level[1, "gear_wear", -1]  # one day: the cheapest
+        for rows in of_level.values():
+            log.note(rows[0]["name"], [], rows=rows)

@@ -5,6 +5,7 @@ import tomllib
 import zipfile
 
 import pyarrow.parquet as pq
+from scipy.io import loadmat
 
 
 def readable(path):
@@ -52,6 +53,10 @@ def _npz(path):
     return zipfile.ZipFile(path).testzip() is None
 
 
+def _mat(path):
+    return bool(loadmat(path))
+
+
 def _png(path):
     return path.read_bytes().rstrip(b"\0").endswith(b"IEND\xaeB`\x82")
 
@@ -59,4 +64,5 @@ def _png(path):
 _READERS = {
     ".log": _log, ".json": _json, ".toml": _toml, ".html": _page, ".parquet": _parquet,
     ".csv": _text, ".md": _text, ".npz": _npz, ".png": _png, ".svg": _text, ".txt": _text,
+    ".mat": _mat,
 }  # fmt: skip

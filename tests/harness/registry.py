@@ -3,24 +3,25 @@
 import typer
 
 from elevon.cli.runner import app
+from studies.commands import app as studies
 
 #: Options by which a command is told where to write.
 OUTPUTS = {"--out", "--report", "--plot", "--svg", "--schema", "--picture", "--table", "--runs"}
 
 
 def commands():
-    """Yield the words of each command and its object."""
-    root = typer.main.get_command(app)
-    context = typer.Context(root)
+    """Yield the words of each command and its object; those of ``python -m studies`` too."""
 
     def walk(command, words):
         if not hasattr(command, "list_commands"):
             yield " ".join(words), command
             return
+        context = typer.Context(command)
         for name in command.list_commands(context):
             yield from walk(command.get_command(context, name), [*words, name])
 
-    yield from walk(root, [])
+    yield from walk(typer.main.get_command(app), [])
+    yield from walk(typer.main.get_command(studies), ["studies"])
 
 
 def writes(command):

@@ -121,3 +121,60 @@ def test_batch_identity_in_both_fidelities(fidelity: str) -> None:
     for r, many in zip(runs, together, strict=True):
         one = elevon.simulate(r.actuator, r.scenario, fidelity=fidelity, record=record, seed=r.seed)
         same(one, many, ["output_position", "motor_speed", "current_q"])
+
+
+LOCATED = HYSTERESIS | {"inverter.relay_crossing": "located"}
+DETAILS = {"inverter.dead_time": 2e-6, "inverter.diode_drop": 1.0, "sensor.current.bits": 12}
+SHORT_TICKS = {"control.sample_time": 125e-6}
+LONG_STEPS = {
+    "carrier, 1 us": PWM,
+    "carrier, 12.5 us": PWM | SHORT_TICKS | {"solver.step": 12.5e-6},
+    # 125 us are no whole number of these steps' carrier periods: they reach from one into the next.
+    "carrier, straddling": PWM | SHORT_TICKS | {"solver.step": 12.5e-6, "pwm.frequency": 3300.0},
+    "carrier, detailed": PWM | SHORT_TICKS | {"solver.step": 12.5e-6} | DETAILS,
+    "located, 5 us": LOCATED | {"solver.step": 5e-6},
+    "located, detailed": LOCATED | {"solver.step": 5e-6} | DETAILS,
+}
+
+
+def different(settings: dict[str, Any], faults: list[dict[str, Any]], count: int) -> list[Any]:
+    """Runs of one structure, each with its own command, inertia and carrier."""
+    runs = []
+    for i in range(count):
+        changes = {"motor.inertia": 7e-4 + 2e-5 * i}
+        if settings["drive.kind"] == "pwm":
+            changes["pwm.frequency"] = settings["pwm.frequency"] + 10.0 * i
+        scenario = make_scenario(
+            duration=0.02,
+            command=[term("sine", amplitude=f"{3 + i} deg", frequency="3 Hz")],
+            extra={"fault": faults},
+        )
+        runs.append(elevon.Run(actuator(settings | changes), scenario, i, f"run {i}"))
+    return runs
+
+
+@pytest.mark.parametrize("case", LONG_STEPS)
+def test_lanes_of_carrier_and_located_steps_are_single_runs_to_the_bit(case: str) -> None:
+    """Every width that this build has, in steps longer than the papers' as well."""
+    record = [",".join([*NAMES, "leg_transitions"]) + "@8 kHz"]
+    runs = different(LONG_STEPS[case], [], 9)
+    alone = [elevon.simulate(r.actuator, r.scenario, record=record) for r in runs]
+    assert all(one.final["leg_transitions"] > 100 for one in alone)
+    for lanes in ("auto", *sorted(set(_core.widths()) & set(WIDTHS))):
+        together = elevon.simulate_batch(runs, record=record, lanes=lanes)
+        for one, many in zip(alone, together, strict=True):
+            for name in one.names:
+                assert np.array_equal(one[name].values, many[name].values), (lanes, name)
+
+
+@pytest.mark.parametrize("case", ["carrier, 12.5 us", "carrier, straddling", "located, 5 us"])
+@pytest.mark.parametrize("fault", ["open_phase@motor.phase_a", "friction@transmission"])
+def test_a_fault_of_severity_zero_leaves_the_bits_of_the_lean_step(case: str, fault: str) -> None:
+    """The step with every detail, the bridge's included, and the lean one."""
+    kind, place = fault.split("@")
+    none = [{"kind": kind, "place": place, "severity": 0.0}]
+    healthy, (faulty,) = different(LONG_STEPS[case], [], 1)[0], different(LONG_STEPS[case], none, 1)
+    record = [",".join(NAMES) + "@8 kHz"]
+    one, other = (elevon.simulate(r.actuator, r.scenario, record=record) for r in (healthy, faulty))
+    for name in NAMES:
+        assert np.array_equal(one[name].values, other[name].values), name

@@ -11,7 +11,7 @@ from tests.physics.gear import gear, value
 
 BOTH = pytest.mark.parametrize("fidelity", ["high", "low"])
 HALLS = "hall_a,hall_b,hall_c"
-FAULT = 6
+LOCKED, STOPPED, FAULT, UNCONFIRMED = 2, 4, 6, 7
 HALL, PROXIMITY = 7, 8
 
 
@@ -79,30 +79,50 @@ def test_lost_power_of_the_sensors_is_the_code_of_none(fidelity: str) -> None:
 @pytest.mark.signature("proximity_off", "proximity")
 @BOTH
 @pytest.mark.parametrize(
-    ("kind", "switch", "start", "seen"),
+    ("kind", "switch", "start", "state", "code", "warning"),
     [
-        ("proximity_on", "0", "100 mm", True),
-        ("proximity_on", "75", "20 mm", True),
-        ("proximity_on", "100", "100 mm", True),
-        ("proximity_off", "0", "0.8 mm", True),
-        ("proximity_off", "25", "267 mm", True),
-        ("proximity_off", "100", "267 mm", True),
-        ("proximity_off", "75", "100 mm", False),
+        ("proximity_off", "25", "267 mm", LOCKED, 0, 3),
+        # The end that was confirmed is not known any more.
+        ("proximity_off", "0", "0.8 mm", UNCONFIRMED, PROXIMITY, 2),
+        ("proximity_off", "100", "267 mm", UNCONFIRMED, PROXIMITY, 5),
+        # Of a pair that no position has, a motion tells which is wrong.
+        ("proximity_on", "0", "100 mm", STOPPED, 0, 8),
+        ("proximity_on", "75", "20 mm", STOPPED, 0, 8),
+        ("proximity_on", "100", "100 mm", STOPPED, 0, 8),
+        # What is off reads off.
+        ("proximity_off", "75", "100 mm", STOPPED, 0, 0),
     ],
 )
 def test_a_failed_switch_reads_its_level(
-    kind: str, switch: str, start: str, seen: bool, fidelity: str
+    kind: str, switch: str, start: str, state: int, code: int, warning: int, fidelity: str
 ) -> None:
-    """Whatever the ram does; a set that no position gives is a fault after 20 ms."""
+    """Whatever the ram does; what the unit makes of it comes after debouncing and the watch."""
     fault = {"kind": kind, "place": f"sensor.proximity_{switch}", "severity": 1.0,
-             "profile": {"kind": "step", "time": 0.1}}  # fmt: skip
-    rec = gear(duration=0.2, start=start, fidelity=fidelity, faults=[fault])
-    contact, state = rec[f"proximity_{switch}"], rec["state"]
+             "profile": {"kind": "step", "time": 2.0}}  # fmt: skip
+    rec = gear(duration=2.2, start=start, fidelity=fidelity, faults=[fault])
+    contact = rec[f"proximity_{switch}"]
     level = 1.0 if kind == "proximity_on" else 0.0
-    assert np.all(contact.values[contact.time > 0.105] == level)
-    assert np.any(contact.values[contact.time < 0.09] != level) is np.bool_(seen)
-    assert (rec.final["state"] == FAULT) is seen
-    if seen:
-        first = state.time[state.values == FAULT][0] - 0.1
-        assert first == pytest.approx(value("control.proximity_time"), abs=0.0025)
-        assert rec.final["fault_code"] == PROXIMITY
+    assert np.all(contact.values[contact.time > 2.005] == level)
+    assert [rec.final[name] for name in ("state", "fault_code", "warning_code")] == [
+        state, code, warning
+    ]  # fmt: skip
+    if warning:
+        codes = rec["warning_code"]
+        first = codes.time[codes.values == warning][0] - 2.0
+        waited = value("control.debounce") + value("control.proximity_time")
+        assert first == pytest.approx(waited, abs=0.0035)
+
+
+@pytest.mark.signature("proximity_on", "weight")
+@pytest.mark.signature("proximity_off", "weight")
+@BOTH
+@pytest.mark.parametrize(("kind", "weight", "refused"), [("on", 0.0, 5.0), ("off", 1.0, 0.0)])
+def test_a_failed_wheels_switch_is_taken_for_its_level(
+    kind: str, weight: float, refused: float, fidelity: str
+) -> None:
+    """Stuck on a retraction in flight is refused; stuck off one on the ground is not."""
+    load = {"weight_on_wheels": {"terms": [{"kind": "constant", "value": weight}]}}
+    rec = gear((1.5, "retract"), duration=2.0, start="267 mm", fidelity=fidelity, load=load,
+               faults=[f"proximity_{kind}@sensor.weight_on_wheels=1"])  # fmt: skip
+    assert np.all(rec["proximity_wheels"].values == (1.0 if kind == "on" else 0.0))
+    assert rec.final["command_refused"] == refused

@@ -26,24 +26,32 @@ PHASES = ("current_a", "current_b", "current_c")
 
 
 def retraction(
-    fidelity: str, *faults: Any, factor: float = 2.5, chopping: str = "low_side"
+    fidelity: str,
+    *faults: Any,
+    factor: float = 2.5,
+    chopping: str = "low_side",
+    values: dict[str, Any] | None = None,
 ) -> dict[str, np.ndarray]:
     """Signals of the steady part of a retraction."""
     names = RECORDED + (PHASES if fidelity == "high" else ())
+    settings = {"load.factor": factor, "inverter.chopping": chopping} | (values or {})
     rec = gear((0.0, "retract"), duration=1.4, start="200 mm", fidelity=fidelity,
                faults=list(faults), record=f"{','.join(names)}@{RATE} Hz",
-               values={"load.factor": factor, "inverter.chopping": chopping})  # fmt: skip
+               values=settings)  # fmt: skip
     late = rec["motor_torque"].time > STEADY
     return {name: rec[name].values[late] for name in names}
 
 
-def of_the_pair(fidelity: str, *faults: Any) -> dict[str, np.ndarray]:
+def of_the_pair(
+    fidelity: str, *faults: Any, values: dict[str, Any] | None = None
+) -> dict[str, np.ndarray]:
     """A retraction in which a sample may show the conducting pair alone.
 
     The switching model does between the pulses of the third phase; the reduced-order one has their
     mean in every sample with low-side chopping, and none with the other.
     """
-    return retraction(fidelity, *faults, chopping="low_side" if fidelity == "high" else "both")
+    chopping = "low_side" if fidelity == "high" else "both"
+    return retraction(fidelity, *faults, chopping=chopping, values=values)
 
 
 def pairs(run: dict[str, np.ndarray]) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import elevon
 from tests.physics.rig import FREE_SHAFT, HYSTERESIS, MOTOR, PWM, RATIO, P, constant, run, term
 
 SENSED = "resolver_speed,output_position,encoder_position"
@@ -50,6 +51,91 @@ def test_shorted_resolver_winding_shows_the_angle_of_its_channels(
     error = np.angle(np.exp(1j * (np.arctan2(a * np.sin(theta), b * np.cos(theta)) - theta)))
     assert rec["resolver_position"].values == pytest.approx(theta + error, abs=1e-9)
     assert np.max(np.abs(error)) == pytest.approx(math.asin(0.4 / 1.6), rel=1e-2)
+
+
+@pytest.mark.signature("quadrature", "resolver")
+@pytest.mark.signature("channel_offset", "resolver")
+@BOTH
+@pytest.mark.parametrize(
+    ("kind", "place", "severity", "harmonics"),
+    [
+        ("quadrature", "sensor.resolver", 0.02, {0: 0.01, 2: -0.01}),
+        ("channel_offset", "sensor.resolver.sine", 0.01, {1: 0.01}),
+        ("channel_offset", "sensor.resolver.cosine", -0.01, {1: -0.01j}),
+    ],
+)
+def test_skewed_or_offset_channels_err_at_their_order_of_the_shaft(
+    fidelity: str, kind: str, place: str, severity: float, harmonics: dict[int, complex]
+) -> None:
+    """Exact: atan2(sin + o_s, cos(theta + delta) + o_c). First order: delta/2 (1 - cos 2 theta)
+    and o_s cos theta - o_c sin theta; complex amplitudes of exp(1j n theta).
+    """
+    rec = spun(fidelity, [fault(kind, place, severity)], 2.0 * math.pi * 3.0)
+    theta = rec["motor_position"].values
+    error = rec["resolver_position"].values - theta
+    skew = severity if kind == "quadrature" else 0.0
+    sine, cosine = (severity if place.endswith(f".{end}") else 0.0 for end in ("sine", "cosine"))
+    reading = np.arctan2(np.sin(theta) + sine, np.cos(theta + skew) + cosine)
+    assert np.angle(np.exp(1j * (reading - theta - error))) == pytest.approx(0.0, abs=1e-9)
+    for order in range(4):
+        amplitude = (1 if order == 0 else 2) * np.mean(
+            error[:-1] * np.exp(-1j * order * theta[:-1])
+        )
+        assert amplitude == pytest.approx(harmonics.get(order, 0.0), abs=severity**2)
+    speed = rec["resolver_speed"].values
+    assert np.gradient(rec["resolver_position"].values, 1e-3)[1:-1] == pytest.approx(
+        speed[1:-1], abs=2e-3
+    )
+
+
+def test_offsets_that_outweigh_a_channel_are_refused() -> None:
+    """The ellipse of the channels would not hold its centre: no angle that turns with the shaft."""
+    weak = [
+        fault("mismatch", "sensor.resolver", 0.85),
+        fault("channel_offset", "sensor.resolver.cosine", 0.16),
+    ]
+    with pytest.raises(elevon.InputError, match="would not turn with the shaft"):
+        spun("high", weak)
+
+
+@pytest.mark.signature("interpolation", "encoder")
+@BOTH
+@pytest.mark.parametrize(("place", "order"), [("first", 1), ("second", 2)])
+def test_interpolation_error_is_a_harmonic_of_the_encoders_period(
+    fidelity: str, place: str, order: int
+) -> None:
+    """A tenth of the period of 20 pulses (4 wheel turns an output turn), read with 400 edges each:
+    what is shown is the true position and T e sin(order z + phase), cut to whole counts.
+    """
+    disc = {"sensor.encoder.pulses": 20.0, "sensor.encoder.edges": 400.0}
+    broken = fault("interpolation", f"sensor.encoder.{place}", 0.1, phase="40 deg")
+    rec = spun(fidelity, [broken], RATIO, **disc)
+    output, measured = rec["output_position"].values, rec["encoder_position"].values
+    period = 2.0 * math.pi / (20.0 * 4.0)
+    angle = order * 2.0 * math.pi * output / period + math.radians(40.0)
+    count = period / 400.0
+    lag = output + 0.1 * period * np.sin(angle) - measured
+    assert np.all((lag > -1e-9) & (lag < count + 1e-9))
+
+
+@BOTH
+def test_loop_on_an_encoder_follows_its_interpolation_error(fidelity: str) -> None:
+    """Slowly commanded, the shown position is the command: the output errs by as much."""
+    rec = run(
+        MOTOR
+        | HYSTERESIS
+        | {"control.position_feedback": "encoder", "sensor.encoder.pulses": 20.0}
+        | {"sensor.encoder.edges": 4000.0, "backlash.total": 0.0},
+        duration=1.5,
+        command=[term("ramp", slope="6 deg/s")],
+        record="output_position,encoder_position@1 kHz",
+        scenario={"fault": [fault("interpolation", "sensor.encoder.first", 0.05)]},
+        fidelity=fidelity,
+    )
+    late = rec["output_position"].time > 0.5
+    error = (rec["output_position"].values - rec["encoder_position"].values)[late]
+    assert np.max(error) == pytest.approx(0.05 * 2.0 * math.pi / 80.0, rel=0.02)
+    assert np.min(error) == pytest.approx(-0.05 * 2.0 * math.pi / 80.0, rel=0.02)
 
 
 @BOTH

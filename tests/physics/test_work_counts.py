@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import job
 
 import elevon
+from benchmarks import job
 
 C_SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "benchmark_job.c"
 
@@ -60,7 +60,9 @@ def test_angle_and_transitions_agree_with_the_yardstick(
 
 def test_full_options_take_no_more_steps() -> None:
     """Options cost time per step, never steps."""
-    rec = elevon.simulate(job.actuator(full=True), job.scenario(0.01, full=True), record=job.RECORD)
+    rec = elevon.simulate(
+        job.actuator("full"), job.scenario(0.01, variant="full"), record=job.RECORD
+    )
     assert rec.meta["status"] == "ok"
     assert rec.meta["steps"] == 10_000
 

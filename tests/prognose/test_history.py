@@ -5,7 +5,7 @@ import json
 import pytest
 
 from elevon import Actuator
-from elevon.errors import InputError, Interrupted
+from elevon.errors import FormatError, InputError, Interrupted
 from elevon.prognose import LAWS
 from elevon.prognose.history import diagnosed, read_history
 
@@ -56,17 +56,13 @@ class Answer:
         return {"faults": [CAUSE], "detectable": {KEY: 1e-4}}
 
 
-@pytest.mark.parametrize(
-    ("name", "module", "function"),
-    [("torino-rotary", "bymodel", "diagnose"), ("nasa-ballscrew", "byroles", "diagnose_by_roles")],
-)
+@pytest.mark.parametrize("name", ["torino-rotary", "nasa-ballscrew"])
 def test_all_logs_of_an_inspection_are_one_diagnosis_against_all_healthy_ones(
-    tmp_path, monkeypatch, name, module, function
+    tmp_path, monkeypatch, name
 ):
     """Which of the healthy logs are of a log's own test is the diagnosis' business."""
-    import elevon.diagnose.bymodel as bymodel
-    import elevon.diagnose.byroles as byroles
-    import elevon.prognose.history as room
+    from elevon.diagnose import door
+    from elevon.prognose import history as room
 
     calls = []
 
@@ -74,9 +70,8 @@ def test_all_logs_of_an_inspection_are_one_diagnosis_against_all_healthy_ones(
         calls.append((actuator.name, logs, baselines))
         return Answer()
 
-    monkeypatch.setattr({"bymodel": bymodel, "byroles": byroles}[module], function, answered)
-    monkeypatch.setattr(bymodel, "read_test_logs", lambda paths: [p.name for p in paths])
-    monkeypatch.setattr(room, "_recordings", lambda paths: [p.name for p in paths])
+    monkeypatch.setattr(door, "diagnose", answered)
+    monkeypatch.setattr(room, "_read", lambda logs: [path.name for path, _ in logs])
     for log in ("a0", "b0", "a1", "b1", "a2", "b2", "c2"):
         (tmp_path / log).touch()
     read = history(
@@ -101,3 +96,17 @@ def test_a_log_that_cannot_be_diagnosed_is_named_with_its_inspection(tmp_path):
     read = history(tmp_path, {"logs": ["a.csv"]})
     with pytest.raises(InputError, match=r"0\.json: .*a\.csv"):
         diagnosed(read, Actuator.load("torino-rotary"))
+
+
+def test_each_log_may_have_its_map(tmp_path):
+    for log in ("a.csv", "b.csv", "own.toml"):
+        (tmp_path / log).touch()
+    one = history(tmp_path / "one", {"logs": ["../a.csv", "../b.csv"], "map": "torino"})
+    assert [column_map for _, column_map in one.entries[0].logs] == ["torino", "torino"]
+    each = history(
+        tmp_path / "each", {"logs": ["../a.csv", "../b.csv"], "map": ["torino", "../own.toml"]}
+    )
+    known = [column_map for _, column_map in each.entries[0].logs]
+    assert known == ["torino", tmp_path / "each" / "../own.toml"]
+    with pytest.raises(FormatError, match="map names 1 for 2 logs"):
+        history(tmp_path / "few", {"logs": ["../a.csv", "../b.csv"], "map": ["torino"]})

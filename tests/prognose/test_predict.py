@@ -1,6 +1,7 @@
 """From a folder of inspections to the remaining life, on the model."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_the_answer_is_where_the_model_meets_its_requirement(unit, tables):
     assert result.median == pytest.approx(end - 2000.0, rel=0.25)
     assert result.first == {"error": 1.0}
     assert result.survives(0.0) == 1.0
-    answer = result.to_dict([100.0])
+    answer = replace(result, horizons=(100.0,)).to_dict()
     assert answer["rul"]["unit"] == "flights"
     assert answer["p_survive"] == [[100.0, 1.0]]
     assert answer["eol_samples"] == 2000

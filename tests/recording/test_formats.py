@@ -63,6 +63,15 @@ def test_two_clocks_of_several_row_groups(tmp_path):
     assert Recording.load(both.save(tmp_path / "a.parquet")).equals(both)
 
 
+@pytest.mark.parametrize("ending", ALL)
+def test_the_same_recording_is_the_same_bytes_at_any_time_of_day(tmp_path, ending, monkeypatch):
+    first = one_clock().save(tmp_path / f"a{ending}").read_bytes()
+    monkeypatch.setattr("time.time", lambda: 1e9)
+    monkeypatch.setattr("time.asctime", lambda: "Sun Sep  9 01:46:40 2001")
+    second = one_clock().save(tmp_path / f"a{ending}", force=True).read_bytes()
+    assert first == second
+
+
 def test_nothing_to_save_is_saved(tmp_path):
     empty = Recording([], clocks=[Clock("main", [])], meta={"status": "interrupted"})
     for ending in ALL:

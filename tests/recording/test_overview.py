@@ -65,7 +65,7 @@ def test_faults_are_named_with_their_severity_and_time(faulty):
 def test_states_of_a_control_unit_are_named():
     run = elevon.simulate("pisa-landing-gear", fidelity="low")
     names = [band.text for band in bands(run) if band.kind == "state"]
-    assert names[0] == "retracted"
+    assert names[0] == "unconfirmed"
     assert "extending" in names
     assert [panel.title for panel in overview(run)] == ["position", "current", "speed"]
     figure = run.plot()

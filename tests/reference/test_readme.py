@@ -1,7 +1,9 @@
 """Every command and example of README and of the guide runs as written."""
 
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +13,7 @@ import pytest
 import elevon
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = ["README.md", "docs/reproduce.md", "docs/sessions.md"]
+PAGES = ["README.md", "docs/reproduce.md", "docs/studies.md", "docs/sessions.md"]
 LONG = (
     "reproduce torino-backlash",
     "reproduce torino-compliance",
@@ -20,8 +22,7 @@ LONG = (
     "--loop ",
     "reproduce nasa-",
     "reproduce pisa-",
-    "reproduce diagnosis-limits",
-    "reproduce prognosis",
+    "studies prognosis",
 )
 """These take ten seconds and more; the short ones run with every `make test`, once."""
 
@@ -55,23 +56,26 @@ COMMANDS = sorted(set(_commands()))
 ELEVON = [
     pytest.param(page, command, marks=_marks(page, command))
     for page, command in COMMANDS
-    if "elevon" in command
+    if "elevon" in command or "studies" in command
 ]
 
 
 def test_there_are_commands_and_an_example():
     assert len(ELEVON) >= 6
-    assert len(_blocks("README.md", "python")) == 1
+    assert len(_blocks("README.md", "python")) == 2
 
 
 @pytest.mark.parametrize(("page", "command"), ELEVON)
 def test_command(page, command, tmp_path):
     words = shlex.split(command)
-    assert words[0] in (".venv/bin/elevon", "elevon")
+    module = "studies" if words[:3] == ["python", "-m", "studies"] else "elevon"
+    assert module == "studies" or words[0] in (".venv/bin/elevon", "elevon")
+    words = words[3:] if module == "studies" else words[1:]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
     done = subprocess.run(
-        [sys.executable, "-m", "elevon.cli", *words[1:]],
+        [sys.executable, "-m", module, *words],
         cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])},
         capture_output=True,
         text=True,
         check=False,
@@ -91,7 +95,7 @@ def test_demo_is_the_command_of_this_page():
 
 
 def test_example(tmp_path):
-    (code,) = _blocks("README.md", "python")
+    code, _ = _blocks("README.md", "python")
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
@@ -99,6 +103,36 @@ def test_example(tmp_path):
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("ok ")
     assert (tmp_path / "run.parquet").is_file()
+
+
+BENCHES = {
+    "torino-rotary": ("chirp", "backlash@transmission=0.5 deg"),
+    "nasa-ballscrew": ("ballscrew-profiles", "backlash@transmission=0.1 mm"),
+    "pisa-landing-gear": ("gear-cycles", "proximity_off@sensor.proximity_25=1"),
+    "examples/linear-drive/drive.toml": ("ballscrew-profiles", "backlash@transmission=0.1 mm"),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("unit", BENCHES)
+def test_from_logs_to_an_answer(unit, tmp_path):
+    """The ten lines as they stand, and with what each other actuator's bench is called."""
+    _, code = _blocks("README.md", "python")
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    (procedure, fault), (chirp, backlash) = BENCHES[unit], BENCHES["torino-rotary"]
+    for old, new in (("torino-rotary", unit), (f'"{chirp}"', f'"{procedure}"'), (backlash, fault)):
+        code = code.replace(old, new)
+    if unit != "torino-rotary":  # the mission is the rotary unit's
+        code = "\n".join(line for line in code.splitlines() if "elevon.predict" not in line)
+    code += "\nprint(*(a.status for _, a in history), *(history[1][1].best))"
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    last = done.stdout.splitlines()[-1].split()
+    assert last[:2] == ["healthy", "faulty"], done.stdout
+    assert fault.partition("=")[0] in last[2:], done.stdout
 
 
 @pytest.mark.parametrize(

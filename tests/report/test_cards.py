@@ -85,12 +85,15 @@ def test_a_sparkline_keeps_its_extremes_and_its_gaps():
 
 
 def test_a_calibration_shows_its_intervals_and_what_it_cannot_tell():
-    from elevon.calibrate.estimate import Estimate
     from elevon.calibrate.notebook_card import calibration_card
+    from elevon.estimate import Estimate
 
     actuator = elevon.Actuator.load("torino-rotary")
     value, interval = 7.913e-4, (7.85e-4, 7.98e-4)
-    item = Estimate("motor.inertia", value, 4e-6, interval, "kg m2", "plant", old=7.7e-4)
+    item = Estimate(
+        value, 4e-6, interval=interval, path="motor.inertia", unit="kg m2", register="plant",
+        old=7.7e-4,
+    )  # fmt: skip
     html = calibration_card(actuator, ["a.csv"], [item], {"backlash.total": "no reversal"})
     text = _text(html)
     for word in ("torino-rotary", "a.csv", "motor.inertia", "kg cm2", "7.7", "backlash.total"):

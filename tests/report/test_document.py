@@ -157,3 +157,6 @@ def test_pages_of_one_folder_link_to_each_other(tmp_path):
     assert '<a href="a%20b.html">First &lt;page&gt;</a>' in html
     assert "other.html" not in html
     assert "Beside this page" not in (tmp_path / "a b.html").read_text("utf-8")
+    first = (tmp_path / "a b.html").read_bytes()
+    Report("First <page>").save(tmp_path / "a b.html", force=True, links=False)
+    assert (tmp_path / "a b.html").read_bytes() == first

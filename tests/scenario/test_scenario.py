@@ -25,6 +25,7 @@ def test_reads_and_writes_the_same():
     data = scenario(
         load={"brake": {"terms": [{"kind": "constant", "value": "1 N m", "enabled": False}]}},
         supply={"terms": [{"kind": "ramp", "slope": "-10 V/s", "initial": 380}]},
+        ambient={"terms": [{"kind": "step", "initial": "20 degC", "final": "-40 degC"}]},
         fault=[{"kind": "short", "place": "motor.phase_a", "severity": "10 %"}],
         initial={"motor_speed": "10 rpm"},
         parameters={"motor.inertia": "9 kg cm2"},
@@ -41,6 +42,15 @@ def test_values_cross_in_si_in_the_order_of_the_records():
     assert values["amplitude"] == pytest.approx(math.radians(7.0))
     assert values["frequency"] == 0.2
     assert values["end"] == math.inf
+
+
+def test_air_is_in_kelvin_and_a_file_says_so(tmp_path):
+    air = {"terms": [{"kind": "constant", "value": "-40 degC"}]}
+    assert compiled(ambient=air).inputs["ambient"][0]["parameters"] == [pytest.approx(233.15)]
+    file = tmp_path / "scenario.toml"
+    file.write_text('duration = "1 s"\n[[ambient.terms]]\nkind = "constant"\nvalue = 20\n')
+    with pytest.raises(UnitError, match=r"ambient\.terms.*degC"):
+        Scenario.load(file)
 
 
 def test_the_unit_of_the_command_goes_with_its_mode():
@@ -157,6 +167,22 @@ REFUSED_FOR_THIS_ACTUATOR = {
     "cycle": (
         {"command": {"terms": [{"kind": "trapezoid", "high": 1, "rise": 0, "fall": 0}]}},
         "longer than zero",
+    ),
+    "cycle below rounding": (
+        {"command": {"terms": [{"kind": "trapezoid", "high": 1, "rise": 1e-17, "fall": 1e-17}]}},
+        "at least 1e-09 s",
+    ),
+    "cycle far away": (
+        {"command": {"terms": [{**SINE, "frequency": 1e4, "start": -1e9}]}},
+        "frequency = 10000 Hz: above 1000",
+    ),
+    "period below rounding": (
+        {"command": {"terms": [{"kind": "rectangle", "high": 1, "period": 1e-20}]}},
+        "period = 1e-20 s: below 1e-09",
+    ),
+    "frequency above rounding": (
+        {"command": {"terms": [{"kind": "triangle", "amplitude": 1, "frequency": 1e17}]}},
+        r"above 1e\+09",
     ),
     "repeat": (
         {"command": {"terms": [{"kind": "table", "times": [0], "values": [0], "repeat": 2}]}},

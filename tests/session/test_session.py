@@ -142,6 +142,57 @@ def test_a_parameter_changes_while_it_runs():
     assert session.actuators[0].parameters["motor.inertia"].value == pytest.approx(10 * inertia)
 
 
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+@pytest.mark.parametrize("name", ["torino-rotary", "nasa-ballscrew", "pisa-landing-gear"])
+def test_the_supplys_parameter_acts_where_nothing_drives_the_supply(name, fidelity):
+    """As `set(supply=...)` to the bit, the state's copy too; refused where it would not act."""
+    gear = name == "pisa-landing-gear"
+    steps = {"command": {"mode": "gear", "steps": [{"time": 0.0, "action": "extend"}]}}
+    kind = {"scenario": {"duration": 1.0, **steps}} if gear else {"mode": "speed"}
+    share = 0.75 if gear else 0.1
+    start = float(elevon.Actuator.load(name).parameters.value("inverter.supply_voltage"))
+    by_port, by_path = (elevon.Session(name, fidelity=fidelity, **kind) for _ in range(2))
+    for session in (by_port, by_path):
+        if not gear:
+            session.set(command=100.0)
+        session.advance(0.02)
+    assert by_path["supply_voltage"] == pytest.approx(start, rel=0.02)
+    by_path.set_parameter("inverter.supply_voltage", share * start)
+    by_port.set(supply=share * start)
+    saved = by_path.save()
+    ends = []
+    for session in (by_port, by_path):
+        session.advance(0.2)
+        ends.append([session[n] for n in ("supply_voltage", "motor_speed", "motor_torque")])
+    assert ends[0] == ends[1]
+    assert ends[1][0] == pytest.approx(share * start, rel=0.2 if gear else 1e-12)
+    by_path.restore(saved)
+    by_path.advance(0.2)
+    assert by_path["motor_speed"] == ends[1][1]
+    with pytest.raises(InputError, match=r"inverter.supply_voltage has no effect: supply is given"):
+        by_port.set_parameter("inverter.supply_voltage", start)
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_the_supplys_parameter_acts_in_each_run_of_a_batch(fidelity):
+    """Lanes with supplies of their own, as each alone, to the bit."""
+    scenario = {"duration": 1.0, "command": {"mode": "speed", "terms": [
+        {"kind": "constant", "value": 300.0}]}}  # fmt: skip
+    runs = [elevon.Run("torino-rotary", scenario, k) for k in range(3)]
+    volts = [20.0, 60.0, 380.0]
+    batch = elevon.Session(runs, fidelity=fidelity)
+    batch.set_parameter("inverter.supply_voltage", volts)
+    batch.advance(0.1)
+    speeds = []
+    for run, volt in zip(runs, volts, strict=True):
+        alone = elevon.Session([run], fidelity=fidelity)
+        alone.set_parameter("inverter.supply_voltage", volt)
+        alone.advance(0.1)
+        speeds.append(alone["motor_speed"][0])
+    assert list(batch["motor_speed"]) == speeds
+    assert speeds[0] < speeds[1] < speeds[2]
+
+
 def test_a_fault_that_is_announced_acts_as_in_a_scenario():
     name = "short@motor.phase_a"
     scenario = {

@@ -92,6 +92,10 @@ impl Model {
     pub fn ports(self) -> &'static [Port] {
         dispatch!(self, W => W::PORTS)
     }
+    /// Ports that set their parameter.
+    pub fn held_ports(self) -> &'static [usize] {
+        dispatch!(self, W => <<W as Wiring>::Machine as Machine>::HELD_PORTS)
+    }
     pub fn initial(self) -> &'static [&'static str] {
         dispatch!(self, W => W::INITIAL)
     }

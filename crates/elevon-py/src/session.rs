@@ -5,7 +5,7 @@ use crate::seam::{bad, busy, failed, guarded};
 use crate::spec::Resolver;
 use elevon_core::command::SourcePlan;
 use elevon_core::fault::FaultSpec;
-use elevon_core::solver::{Change, Live, Status, Width};
+use elevon_core::solver::{Change, Live, Refusal, Status, Width};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -132,6 +132,7 @@ impl Runs {
     /// Gives a port of a run a sum of waveforms; false where that needs equations that are not in use.
     fn set_input(&mut self, run: usize, port: &str, terms: &Bound<'_, PyList>) -> PyResult<bool> {
         let (port, plan) = (self.port(port)?, self.resolver.plan(terms)?);
+        self.settable(port, &plan)?;
         self.change(run, Change::Input { port, plan })
     }
 
@@ -145,7 +146,9 @@ impl Runs {
             return Err(bad(format!("{wrong} is not a number")));
         }
         for (run, &value) in values.iter().enumerate() {
-            if !self.change(run, Change::Input { port, plan: SourcePlan::constant(value) })? {
+            let plan = SourcePlan::constant(value);
+            self.settable(port, &plan)?;
+            if !self.change(run, Change::Input { port, plan })? {
                 return Ok(false);
             }
         }
@@ -192,6 +195,16 @@ impl Runs {
         }
     }
 
+    /// Refuses waveforms that would set a parameter out of its range.
+    fn settable(&self, port: usize, plan: &SourcePlan) -> PyResult<()> {
+        let sets = self.resolver.model.held_ports().contains(&port);
+        if sets {
+            self.resolver.settable(port, plan, f64::INFINITY)
+        } else {
+            Ok(())
+        }
+    }
+
     fn port(&self, name: &str) -> PyResult<usize> {
         self.resolver.model.ports().iter().position(|p| p.name == name).ok_or_else(|| bad(format!("no input {name:?}")))
     }
@@ -208,7 +221,14 @@ impl Runs {
 
     fn change(&mut self, run: usize, change: Change) -> PyResult<bool> {
         let (block, place) = self.place(run)?;
-        Ok(self.blocks[block].1.change(place, change).is_ok())
+        match self.blocks[block].1.change(place, change) {
+            Ok(()) => Ok(true),
+            Err(Refusal::LeftOut) => Ok(false),
+            Err(Refusal::Driven(port)) => {
+                let port = &self.resolver.model.ports()[port];
+                Err(bad(format!("{} has no effect: {} is given from outside, by a waveform or a value", port.parameter, port.name)))
+            }
+        }
     }
 }
 

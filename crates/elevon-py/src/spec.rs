@@ -53,6 +53,16 @@ fn in_range(model: Model, raw: &[f64], start: &str) -> PyResult<()> {
     Ok(())
 }
 
+/// Runs without an end are looked at over a day, s.
+const LONGEST_LOOK: f64 = 86_400.0;
+
+/// Bounds of the parameter in place `index`, where the value is beyond them.
+fn outside(model: Model, index: usize, value: f64) -> Option<(f64, f64)> {
+    let range = model.groups().iter().flat_map(|g| g.variables).nth(index)?.range;
+    let (low, high, _) = range.bounds();
+    (!range.contains(value)).then_some((low, high))
+}
+
 /// Steps are counted in whole numbers that a double holds exactly.
 const MOST_STEPS: f64 = 9.0e15;
 
@@ -173,6 +183,10 @@ impl Resolver {
         }
         let inputs = need(d, "inputs")?.cast_into::<PyDict>()?;
         let (ports, driven) = self.ports(&parameters, &inputs)?;
+        let duration = self.duration(d, &parameters)?;
+        for &port in self.model.held_ports() {
+            self.settable(port, &ports[port], duration)?;
+        }
         let initial: HashMap<String, f64> = need(d, "initial")?.extract()?;
         let names = self.model.initial();
         if let Some(unknown) = initial.keys().find(|k| !names.contains(&k.as_str())) {
@@ -188,7 +202,6 @@ impl Resolver {
         if let Some(message) = self.refused(&parameters, &faults, &names_of(&given)?) {
             return Err(bad(message));
         }
-        let duration = self.duration(d, &parameters)?;
         Ok(RunSpec {
             parameters,
             ports,
@@ -309,6 +322,21 @@ impl Resolver {
             }
         }
         Ok((ports, driven))
+    }
+
+    /// Refuses waveforms by which a port would set its parameter out of its range within `duration`, looked at a thousand times.
+    pub fn settable(&self, port: usize, plan: &SourcePlan, duration: f64) -> PyResult<()> {
+        let port = &self.model.ports()[port];
+        let index = self.parameter(port.parameter)?;
+        let looks = 1000;
+        let dt = duration.min(LONGEST_LOOK) / looks as f64;
+        for (k, value) in (0..=looks).map(|k| (k, plan.value(k, dt))) {
+            if let Some((low, high)) = outside(self.model, index, value) {
+                let (name, unit, time) = (port.name, port.unit, k as f64 * dt);
+                return Err(bad(format!("{name}: {value:.6} {unit} at {time:.6} s is outside {low} to {high} {unit}")));
+            }
+        }
+        Ok(())
     }
 
     /// Clocks and their names.

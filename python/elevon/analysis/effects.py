@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,17 +12,17 @@ from elevon.analysis.response import CampaignResponse
 from elevon.analysis.terms import TermColumn, blocks_matrix, further_contrasts, separate
 from elevon.arrays import Floats
 from elevon.errors import InputError
+from elevon.plain import STORED, Plain
+from elevon.results import Result
+
+if TYPE_CHECKING:
+    from elevon.report import Report
 
 __all__ = ["EffectEstimate", "Effects", "effects_of"]
 
-EQUAL_REPEATS = (
-    "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
-    "units); they count as one run"
-)
-
 
 @dataclass(frozen=True)
-class EffectEstimate:
+class EffectEstimate(Plain):
     """One effect: the response's change from the lowest to the highest level.
 
     Attributes
@@ -48,7 +48,7 @@ class EffectEstimate:
 
 
 @dataclass(frozen=True)
-class Effects:
+class Effects(Result):
     """Effects of a campaign's factors on a response.
 
     Attributes
@@ -66,6 +66,8 @@ class Effects:
         Terms confounded with the blocks; interactions partly aliased and left out.
     equal_repeats : bool
         The repeats of every point are equal: nothing random was simulated, they count as one run.
+    folder : str
+        The campaign's.
     """
 
     response: str
@@ -85,10 +87,26 @@ class Effects:
     blocked: list[str]
     partial: list[str]
     equal_repeats: bool
+    folder: Annotated[str, STORED] = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {**vars(self), "terms": [vars(term) for term in self.terms]}
+    KIND: ClassVar = "effects"
+    COMPUTED: ClassVar = ("status",)
+    TABLE: ClassVar = "terms"
+    BARS: ClassVar = ("name", "effect")
+    status: ClassVar = "ok"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        moved = [term.name for term in self.terms if term.significant]
+        what = f"{', '.join(moved)} move it" if moved else "no factor is seen to move it"
+        return f"{self.response} [{self.unit}] in {self.runs} runs: {what}."
+
+    def report(self, *, date: str | None = None) -> Report:
+        """Return its page."""
+        from elevon.analysis.effects_page import effects_report
+
+        return effects_report(self, self.folder, date=date)
 
 
 def effects_of(response: CampaignResponse, *, level: float = 0.95) -> Effects:

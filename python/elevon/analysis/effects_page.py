@@ -6,14 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.analysis.effects import EQUAL_REPEATS, Effects
 from elevon.report import Report, ReportTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["effects_report", "half_normal", "pareto"]
+    from elevon.analysis.effects import Effects
 
+__all__ = ["EQUAL_REPEATS", "effects_report", "half_normal", "pareto"]
+
+EQUAL_REPEATS = (
+    "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
+    "units); they count as one run"
+)
 _METHODS = {
     "replicates": "Student's t with the pure error of repeated points",
     "lenth": "Lenth's pseudo standard error: the design is not replicated",

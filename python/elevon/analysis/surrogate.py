@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,8 @@ from elevon.analysis.kriging import CoKriging, Interpolator, Kriging
 from elevon.analysis.pairs import Pairs, Samples
 from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted
+from elevon.plain import Plain
+from elevon.results import Result
 
 __all__ = ["Study", "SurrogateScore", "study"]
 
@@ -22,7 +24,7 @@ _HELD_OUT, _HIGH_SHARE = 0.3, 0.5
 
 
 @dataclass(frozen=True)
-class SurrogateScore:
+class SurrogateScore(Plain):
     """A surrogate's error on held-out high points over random splits.
 
     Attributes
@@ -47,7 +49,7 @@ class SurrogateScore:
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Result):
     """Surrogates of one response at equal cost.
 
     Attributes
@@ -73,9 +75,20 @@ class Study:
     gain: float | None
     gain_interval: tuple[float, float] | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {**vars(self), "variants": [vars(item) for item in self.variants]}
+    KIND: ClassVar = "surrogate"
+    COMPUTED: ClassVar = ("status",)
+    TABLE: ClassVar = "variants"
+    BARS: ClassVar = ("name", "mean")
+    status: ClassVar = "ok"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        best = min(self.variants, key=lambda item: item.mean)
+        return (
+            f"{self.response}: {best.name} predicts runs it has not seen within {best.mean:.3g} of "
+            "the response's standard deviation."
+        )
 
 
 def study(
@@ -88,7 +101,7 @@ def study(
     budget: int | None = None,
     splits: int = 10,
     seed: int = 0,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Study:
     """Compare surrogates on held-out points at equal cost.
 

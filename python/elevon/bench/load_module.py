@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -83,7 +82,7 @@ class Weights:
     forces: tuple[float, ...]
     radius: float
 
-    def table(self, start: float) -> dict[str, Any]:
+    def table(self, start: float) -> dict[str, object]:
         """Return the load term [N m at the output], `start` s into the log."""
         return {
             "kind": "table",

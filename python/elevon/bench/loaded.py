@@ -65,7 +65,7 @@ class LoadedSetup:
     force: ForceStep | None
     settings: dict[str, Any]
 
-    def truth(self) -> dict[str, Any]:
+    def truth(self) -> dict[str, object]:
         """Return what the log does not state."""
         parameters = self.actuator.parameters
         return {

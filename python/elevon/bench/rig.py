@@ -99,7 +99,7 @@ class Setup:
     rig: Rig
     brake: BrakeRun | None
 
-    def truth(self) -> dict[str, Any]:
+    def truth(self) -> dict[str, object]:
         """Return what the log's reader does not know."""
         parameters = self.actuator.parameters
         return {

@@ -8,7 +8,7 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_loaded
 from elevon.bench.rig import Setup, setups
@@ -18,7 +18,9 @@ from elevon.bench.traces import recorded, write_traces
 from elevon.errors import InputError
 from elevon.files import check_output, write_text
 from elevon.logs.formats.drive import DriveFormat
+from elevon.plain import WORKING, Plain, in_unit
 from elevon.progress import Progress, part
+from elevon.results import Result
 from elevon.worklog import locked, sweep
 
 if TYPE_CHECKING:
@@ -30,8 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["BenchLogFiles", "BenchResult", "claim_bench", "run_procedure", "state_file"]
 
 
-@dataclass(frozen=True, slots=True)
-class BenchLogFiles:
+@dataclass(frozen=True)
+class BenchLogFiles(Plain):
     """One log: its files, how its run ended (and why), and whether it was there before."""
 
     name: str
@@ -40,19 +42,9 @@ class BenchLogFiles:
     resumed: bool
     message: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain types."""
-        return {
-            "name": self.name,
-            "status": self.status,
-            "message": self.message,
-            "files": [str(path) for path in self.files],
-            "resumed": self.resumed,
-        }
 
-
-@dataclass(frozen=True, slots=True)
-class BenchResult:
+@dataclass(frozen=True)
+class BenchResult(Result):
     """The logs of a procedure.
 
     Attributes
@@ -72,20 +64,33 @@ class BenchResult:
     procedure: str
     logs: tuple[BenchLogFiles, ...]
     truth: Path | None
-    sim_s: float
-    wall_s: float
-    hidden: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    sim_s: Annotated[float, in_unit("s")]
+    wall_s: Annotated[float, in_unit("s")] = field(compare=False)
+    hidden: Annotated[Mapping[str, Any], WORKING] = field(
+        default_factory=dict, repr=False, compare=False
+    )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": "ok" if all(log.status == "ok" for log in self.logs) else "tripped",
-            "procedure": self.procedure,
-            "logs": [log.to_dict() for log in self.logs],
-            "truth": None if self.truth is None else str(self.truth),
-            "sim_s": self.sim_s,
-            "wall_s": self.wall_s,
-        }
+    KIND: ClassVar = "bench"
+    COMPUTED: ClassVar = ("status",)
+    TABLE: ClassVar = "logs"
+
+    @property
+    def status(self) -> str:
+        """``ok``, or ``tripped`` where a run ended before its time."""
+        return "ok" if all(log.status == "ok" for log in self.logs) else "tripped"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        made = sum(not log.resumed for log in self.logs)
+        return (
+            f"{self.procedure}: {made} of {len(self.logs)} logs made, {self.sim_s:g} s simulated."
+        )
+
+    @property
+    def paths(self) -> list[Path]:
+        """The logs' files, one each, without what stands beside them."""
+        return [path for log in self.logs for path in log.files if path.name == f"{log.name}.csv"]
 
 
 AnySetup = Setup | LoadedSetup

@@ -63,7 +63,7 @@ def make_benchmark(
     runs: int | None = None,
     seed: int = 0,
     threads: int | None = None,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Made:
     """Make the benchmark set, or go on with one that was interrupted.
 

@@ -78,7 +78,7 @@ def score_benchmark(
     folder: str | os.PathLike[str],
     *,
     seed: int = 0,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> list[Score]:
     """Train a random forest on each actuator's training units and score it on the others.
 

@@ -9,19 +9,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from elevon.calibrate.calibration import Calibration, calibrate
-    from elevon.calibrate.log import BenchLog, read_logs
+    from elevon.calibrate.calibration import calibrate
+    from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import Validation, validate
+    from elevon.logs.log import Log
+    from elevon.logs.read import read_drive_logs as read_logs
 
-__all__ = ["BenchLog", "Calibration", "Validation", "calibrate", "read_logs", "validate"]
+__all__ = ["Calibration", "Log", "Validation", "calibrate", "read_logs", "validate"]
 
 _HOMES = {
-    "BenchLog": "log",
-    "read_logs": "log",
-    "Calibration": "calibration",
-    "calibrate": "calibration",
-    "Validation": "validation",
-    "validate": "validation",
+    "Log": ("logs.log", "Log"),
+    "read_logs": ("logs.read", "read_drive_logs"),
+    "Calibration": ("calibrate.outcome", "Calibration"),
+    "calibrate": ("calibrate.calibration", "calibrate"),
+    "Validation": ("calibrate.validation", "Validation"),
+    "validate": ("calibrate.validation", "validate"),
 }
 
 
@@ -30,4 +32,5 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    module, attribute = _HOMES[name]
+    return getattr(import_module(f"elevon.{module}"), attribute)

@@ -10,9 +10,9 @@ import numpy as np
 
 from elevon.calibrate.candidates import within_inertia
 from elevon.calibrate.dynamic import Dynamic
-from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.plant import Torque
 from elevon.errors import InputError
+from elevon.estimate import Estimate
 from elevon.parameters.records import record_of
 from elevon.parameters.relations import static_following
 

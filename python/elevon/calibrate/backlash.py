@@ -6,20 +6,24 @@ friction, inertia or controller in it. All samples count, those inside the gap t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.blocks import block_covariance, stroke_blocks
-from elevon.calibrate.estimate import quantile
-from elevon.calibrate.log import BenchLog
+from elevon.estimate import quantile
+from elevon.estimate.covariance import numbered_strokes
+from elevon.estimate.residual import fit_residual
+from elevon.logs.log import Log
 
 __all__ = ["BacklashFit", "fit_backlash", "median_width", "through_backlash"]
 
 _TRAVEL = 3.0  # backlashes (or counts) of travel in both directions that a log must have
+_STRETCH = 0.5  # s: of a free output, within which a load is taken as constant (ASSUMED)
+_AGREE = 3  # stretches of one span at least
+_DEFLECTS = 0.1  # of the backlash: a span that goes further is a deflection under load (ASSUMED)
 _FLOATS = 3.0  # counts of residual that no rounding leaves: the output is free
 
 
@@ -43,6 +47,9 @@ class BacklashFit:
     floats : bool
         The output is free: it moves on its own within the backlash. Only the span of the two
         positions' difference is known then; gain and delay are not.
+    beyond : float
+        Of a free output: how much further than the backlash the difference goes under load, by the
+        transmission's compliance [rad].
     """
 
     backlash: tuple[float, float]
@@ -54,6 +61,7 @@ class BacklashFit:
     reach: float
     logs: tuple[str, ...]
     floats: bool = False
+    beyond: float = 0.0
 
 
 def through_backlash(driver: Floats, width: float) -> Floats:
@@ -67,12 +75,12 @@ def through_backlash(driver: Floats, width: float) -> Floats:
     return out
 
 
-def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> BacklashFit | None:
+def fit_backlash(logs: Sequence[Log], ratio: float, count: float) -> BacklashFit | None:
     """Fit backlash, offset, gain and delay to every log that moves in both directions.
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         Those without both positions are passed over.
     ratio : float
         Gear ratio.
@@ -87,10 +95,8 @@ def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> Backla
     used = [log for log in logs if _usable(log, ratio, count)]
     if not used:
         return None
-    from scipy.optimize import least_squares
-
-    drivers = [log.motor / ratio for log in used if log.motor is not None]
-    outputs = [log.output for log in used if log.output is not None]
+    drivers = [log.motor / ratio for log in used if log.has("motor_position")]
+    outputs = [log.output for log in used if log.has("output_position")]
     width, centre = _start(used, drivers, outputs)
     keeps = [_after_reversal(x, width) for x in drivers]
     speeds = [log.speed / ratio for log in used]
@@ -105,23 +111,17 @@ def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> Backla
             parts.append(((p[2] * following + p[1] - p[3] * follows) - y)[keep])
         return np.concatenate(parts) / count
 
-    def jacobian(p: Floats) -> Floats:
-        return _jacobian(residual, p, scale)
-
-    best = least_squares(
-        residual,
-        [width, centre, 1.0, 0.0],
-        x_scale=scale,
-        loss="soft_l1",
-        f_scale=3.0,
-        max_nfev=30,
-        jac=jacobian,
-    )
-    covariance, degrees = _covariance(best, used, keeps)
+    best = fit_residual(
+        residual, [width, centre, 1.0, 0.0], scale=scale, loss="soft_l1", soft=3.0, most=30,
+        jacobian=lambda p: _jacobian(residual, p, scale),
+    )  # fmt: skip
+    # Blocks of whole strokes: the encoder's rounding repeats itself within one.
+    strokes = [(x.time[k], x.speed[k], x.period) for x, k in zip(used, keeps, strict=True)]
+    blocks = numbered_strokes(strokes, best.weight * best.residual)
+    covariance, degrees = best.covariance(blocks)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    value = np.array(best.x)
-    value[0] = abs(value[0])
-    rms = count * float(np.sqrt(np.mean(residual(best.x) ** 2)))
+    value = np.append(abs(best.x[0]), best.x[1:])
+    rms = count * float(np.sqrt(np.mean(best.residual**2)))
     if rms > _FLOATS * count:
         return _spanned(used, drivers, outputs, keeps, count=count, rms=rms)
     pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
@@ -138,7 +138,7 @@ def fit_backlash(logs: Sequence[BenchLog], ratio: float, count: float) -> Backla
 
 
 def _spanned(
-    logs: Sequence[BenchLog],
+    logs: Sequence[Log],
     drivers: Sequence[Floats],
     outputs: Sequence[Floats],
     keeps: Sequence[npt.NDArray[np.bool_]],
@@ -151,19 +151,24 @@ def _spanned(
     The difference of the two positions piles up at both ends. What it leaves out at either side
     within twenty to one crosses the backlash or is not yet in contact; what lies beyond two hundred
     to one is the compliance of the contacts: the backlash is between the two spans, less the count
-    of the rounding.
+    of the rounding. Where the log spans far more than the stretches that agree with each other,
+    loads deflect the transmission: those stretches hold the backlash, the rest is compliance.
     """
-    inner, outer, middles = [], [], []
-    for x, y, keep in zip(drivers, outputs, keeps, strict=True):
-        edges = np.percentile((y - x)[keep], [0.5, 5.0, 95.0, 99.5])
-        inner.append(edges[2] - edges[1])
-        outer.append(edges[3] - edges[0])
-        middles.append(0.5 * (edges[3] + edges[0]))
-    low, high = max(min(inner) - count, 0.0), max(outer) - count
+    gaps = [(y - x)[keep] for x, y, keep in zip(drivers, outputs, keeps, strict=True)]
+    low, high, middle = _spans(gaps)
+    unloaded = _unloaded(
+        [gap[a:b] for gap, log in zip(gaps, logs, strict=True) for a, b in _stretches(gap, log)],
+        count,
+    )
+    beyond = 0.0
+    if unloaded and high > (1.0 + _DEFLECTS) * max(span for _, span, _ in map(_span, unloaded)):
+        whole, (low, high, middle) = high, _spans(unloaded)
+        beyond = whole - high
+    low, high = max(low - count, 0.0), high - count
     half = 0.5 * (high - low) / quantile(np.inf)
     return BacklashFit(
         backlash=(0.5 * (low + high), half),
-        offset=(float(np.mean(middles)), half),
+        offset=(middle, half),
         gain=(1.0, np.inf),
         delay=(0.0, np.inf),
         degrees=np.inf,
@@ -171,41 +176,75 @@ def _spanned(
         reach=0.5 * max(float(np.ptp(x)) for x in drivers),
         logs=tuple(log.name for log in logs),
         floats=True,
+        beyond=beyond,
     )
 
 
-def _jacobian(residual: object, p: Floats, scale: Floats) -> Floats:
+def _span(gap: Floats) -> tuple[float, float, float]:
+    """Span of a difference within twenty to one, within two hundred to one, and its middle."""
+    first, low, high, last = (float(x) for x in np.percentile(gap, [0.5, 5.0, 95.0, 99.5]))
+    return high - low, last - first, 0.5 * (last + first)
+
+
+def _spans(gaps: Sequence[Floats]) -> tuple[float, float, float]:
+    """Least inner and largest outer span, and the mean of the middles."""
+    inner, outer, middles = zip(*map(_span, gaps), strict=True)
+    return min(inner), max(outer), float(np.mean(middles))
+
+
+def _stretches(gap: Floats, log: Log) -> list[tuple[int, int]]:
+    width = max(round(_STRETCH / log.period), 2)
+    return [(k, k + width) for k in range(0, len(gap) - width + 1, width)]
+
+
+def _unloaded(stretches: Sequence[Floats], count: float) -> list[Floats]:
+    """Return the stretches that cross the backlash without a load; none where few agree.
+
+    A load deflects the transmission as far as it is large; without one the span is the backlash in
+    every stretch: it is the span on which most stretches agree to two counts.
+    """
+    crossing = [gap for gap in stretches if _span(gap)[1] > _TRAVEL * count]
+    spans = np.array([_span(gap)[1] for gap in crossing])
+    near = np.abs(spans[:, None] - spans) <= 2.0 * count
+    if len(spans) == 0 or near.sum(axis=1).max() < _AGREE:
+        return []
+    alike = near[int(np.argmax(near.sum(axis=1)))]
+    return [gap for gap, same in zip(crossing, alike, strict=True) if same]
+
+
+def _jacobian(residual: Callable[[Floats], Floats], p: Floats, scale: Floats) -> Floats:
     """Central differences over steps of the size that matters: the backlash's kinks average out."""
     columns = []
     for k, step in enumerate(0.5 * scale):
         shift = np.zeros_like(p)
         shift[k] = step
-        columns.append((residual(p + shift) - residual(p - shift)) / (2.0 * step))  # type: ignore[operator]
+        columns.append((residual(p + shift) - residual(p - shift)) / (2.0 * step))
     return np.column_stack(columns)
 
 
-def _usable(log: BenchLog, ratio: float, count: float) -> bool:
-    if log.motor is None or log.output is None:
+def _usable(log: Log, ratio: float, count: float) -> bool:
+    if not log.has("motor_position", "output_position"):
         return False
     speed = np.abs(log.speed).max()
     both = min(float((log.speed > 0.1 * speed).mean()), float((log.speed < -0.1 * speed).mean()))
     return both > 0.02 and float(np.ptp(log.motor)) / ratio > _TRAVEL * count
 
 
-def median_width(log: BenchLog, ratio: float, count: float) -> float | None:
+def median_width(log: Log, ratio: float, count: float) -> float | None:
     """Backlash of one log [rad at the output] by the medians of each direction, or None."""
-    if not _usable(log, ratio, count) or log.motor is None or log.output is None:
+    if not _usable(log, ratio, count):
         return None
     return _start([log], [log.motor / ratio], [log.output])[0]
 
 
 def _start(
-    logs: Sequence[BenchLog], drivers: Sequence[Floats], outputs: Sequence[Floats]
+    logs: Sequence[Log], drivers: Sequence[Floats], outputs: Sequence[Floats]
 ) -> tuple[float, float]:
     """Median lag of each direction, away from reversals: half a backlash either side of centre."""
     ahead, behind = [], []
     for log, x, y in zip(logs, drivers, outputs, strict=True):
-        fast = 0.3 * np.abs(log.speed).max()
+        # Of the slower direction some samples must remain.
+        fast = min(0.3 * np.abs(log.speed).max(), 0.9 * min(log.speed.max(), -log.speed.min()))
         lag = y - x
         ahead.append(np.median(lag[log.speed > fast]))
         behind.append(np.median(lag[log.speed < -fast]))
@@ -217,21 +256,3 @@ def _after_reversal(x: Floats, width: float) -> npt.NDArray[np.bool_]:
     """Samples after the gap has surely been crossed once: before, the start decides the output."""
     reach = np.maximum.accumulate(x) - np.minimum.accumulate(x)
     return np.asarray(reach > 1.5 * width, dtype=np.bool_)
-
-
-def _covariance(
-    best: object, logs: Sequence[BenchLog], keeps: Sequence[npt.NDArray[np.bool_]]
-) -> tuple[Floats, float]:
-    """Blocks of whole strokes: the encoder's rounding repeats itself within one."""
-    jac, fun = np.asarray(best.jac), np.asarray(best.fun)  # type: ignore[attr-defined]
-    weight = 1.0 / np.sqrt(1.0 + (fun / 3.0) ** 2)
-    scores, blocks, at = [], [], 0
-    for log, keep in zip(logs, keeps, strict=True):
-        size = int(keep.sum())
-        part = slice(at, at + size)
-        scores.append(jac[part] * (weight[part] * fun[part])[:, None])
-        blocks.append(
-            stroke_blocks(log.time[keep], log.speed[keep], weight[part] * fun[part], log.period)
-        )
-        at += size
-    return block_covariance(jac.T @ (weight[:, None] ** 3 * jac), scores, blocks)

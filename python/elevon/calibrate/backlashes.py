@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from elevon.calibrate.backlash import BacklashFit, fit_backlash, median_width
-from elevon.calibrate.log import BenchLog
+from elevon.logs.log import Log
 
 __all__ = ["PER_LOG", "backlashes_differ", "differing_backlashes", "pooled_backlash"]
 
@@ -18,14 +18,12 @@ _COUNTS = 3.0  # counts of the encoder that it also exceeds
 _SIGMAS = 4.0  # deviations that it also exceeds
 
 
-def differing_backlashes(
-    logs: Sequence[BenchLog], ratio: float, count: float
-) -> dict[str, BacklashFit]:
+def differing_backlashes(logs: Sequence[Log], ratio: float, count: float) -> dict[str, BacklashFit]:
     """Return each log's own fit where the logs' backlashes differ, else nothing.
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         Those without both positions, or without a reversal, are passed over.
     ratio : float
         Gear ratio.

@@ -10,15 +10,15 @@ controller, no command enters
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import SmoothedMotion, delayed, dilated, lagged, motion_of, smoothed
-from elevon.calibrate.regression import Regression, robust_cost, robust_regression, with_deviations
+from elevon.estimate.regression import Regression, huber, robust_cost, with_deviations
+from elevon.logs.log import Log
 
 __all__ = ["torque_balance"]
 
@@ -29,15 +29,13 @@ _CLEAR = 0.01  # s around a reversal and a slow sample that are left out too
 _LAGS = (-0.005, 0.02)  # s searched for the current's lag behind the motion
 
 
-def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regression | None:
+def torque_balance(logs: Sequence[Log]) -> Regression | None:
     """Regress the measured current on motion, friction and brake.
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         Those with an unmeasured brake count only where there is no other.
-    keeps : sequence of ndarray of bool
-        Samples that may be used, one a log.
 
     Returns
     -------
@@ -52,11 +50,11 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     used = [logs[k] for k in chosen]
     motions = [motion_of(log) for log in used]
     cell = any(log.brake.measured for log in used)
-    masks = [_moving(logs[k], m, keeps[k]) for k, m in zip(chosen, motions, strict=True)]
+    masks = [_moving(log, m) for log, m in zip(used, motions, strict=True)]
     if sum(int(m.sum()) for m in masks) < 200 or not _both_ways(motions, masks):
         return None
     both = cell and any(log.brake.known == "off" for log in used)
-    measured = all(log.current_signal == "current_q_meas" for log in used)
+    measured = all(log.has("torque_current") for log in used)
     names = (
         "inertia",
         "viscous",
@@ -69,16 +67,13 @@ def torque_balance(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> Regressi
     problem = _Balance(used, motions, masks, cell, both)
     answer = problem.solve()
     design = np.column_stack((answer.design, problem.slope(answer)))
-    times = [(log.time[m], log.speed[m], log.period) for log, m in zip(used, masks, strict=True)]
+    strokes = [(log.time[m], log.speed[m], log.period) for log, m in zip(used, masks, strict=True)]
     value = np.append(answer.beta, answer.lag)
-    regression = with_deviations(names, value, design, answer.residual, answer.weight, times=times)
-    if not np.isfinite(regression.covariance).all():
-        return regression
-    covariance = regression.covariance
-    for other in problem.variants(answer):
-        gap = np.append(other.beta, other.lag) - value
-        covariance = covariance + np.outer(gap, gap)
-    return replace(regression, covariance=covariance)
+    regression = with_deviations(
+        names, value, design, answer.residual, answer.weight, strokes=strokes
+    )
+    others = problem.variants(answer) if np.isfinite(regression.covariance).all() else []
+    return regression.open_to(np.append(other.beta, other.lag) for other in others)
 
 
 @dataclass(frozen=True)
@@ -96,7 +91,7 @@ class _Solved:
 class _Balance:
     """The torque balance of several logs, ready to be solved in more than one way."""
 
-    logs: Sequence[BenchLog]
+    logs: Sequence[Log]
     motions: Sequence[SmoothedMotion]
     masks: Sequence[Bools]
     cell: bool
@@ -118,8 +113,9 @@ class _Balance:
             moved = delayed(columns, lag, log.period) if delay else lagged(columns, lag, log.period)
             rows.append(moved[mask])
             data.append(motion.current[mask])
-        solved = robust_regression(np.vstack(rows), np.concatenate(data))
-        return _Solved(solved[0], lag, *solved[1:])
+        design = np.vstack(rows)
+        beta, residual, weight = huber(design, np.concatenate(data))
+        return _Solved(beta, lag, residual, weight, design)
 
     def solve(self, *, delay: bool = False) -> _Solved:
         """Find the lag of least robust cost."""
@@ -158,14 +154,14 @@ class _Balance:
         return solved
 
 
-def _moving(log: BenchLog, motion: SmoothedMotion, keep: Bools) -> Bools:
+def _moving(log: Log, motion: SmoothedMotion) -> Bools:
     """Samples well inside a stretch of motion in one direction."""
     slow = np.abs(motion.speed) < _SLOW * np.abs(motion.speed).max()
     ends = np.zeros(len(slow), dtype=np.bool_)
     margin = max(4, round(4.0 * motion.sigma))
     ends[:margin] = ends[-margin:] = True
     near = dilated(slow, log.period, _CLEAR + 3.0 * motion.sigma * log.period)
-    return np.asarray(keep & log.good & ~near & ~ends, dtype=np.bool_)
+    return np.asarray(log.good & ~near & ~ends, dtype=np.bool_)
 
 
 def _both_ways(motions: Sequence[SmoothedMotion], masks: Sequence[Bools]) -> bool:
@@ -174,7 +170,7 @@ def _both_ways(motions: Sequence[SmoothedMotion], masks: Sequence[Bools]) -> boo
 
 
 def _balance_columns(
-    log: BenchLog, motion: SmoothedMotion, cell: bool, both: bool, *, drift: float = 0.0
+    log: Log, motion: SmoothedMotion, cell: bool, both: bool, *, drift: float = 0.0
 ) -> Floats:
     sign = np.sign(motion.speed)
     dry = [sign]

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.log import BenchLog
+from elevon.logs.log import Log
 
 __all__ = ["Breakaways", "breakaway_torque", "breakaways", "stuck_stretches"]
 
@@ -57,8 +57,7 @@ class Breakaways:
 
 
 def breakaway_torque(
-    logs: Sequence[BenchLog],
-    keeps: Sequence[Bools],
+    logs: Sequence[Log],
     *,
     constant: float,
     offset: float,
@@ -69,7 +68,7 @@ def breakaway_torque(
 
     Parameters
     ----------
-    logs, keeps
+    logs
         As `breakaways`.
     constant : float
         Torque constant [N m/A].
@@ -85,7 +84,7 @@ def breakaway_torque(
         instant may be misplaced alike every time, and from the set point's own shift. None with
         fewer than four breakaways.
     """
-    every = breakaways(logs, keeps, lag, slow)
+    every = breakaways(logs, lag, slow)
     count = len(every.current)
     if count < _FEWEST:
         return None
@@ -123,9 +122,7 @@ class _Event:
         return float(slope), float(level)
 
 
-def breakaways(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float, slow: float
-) -> Breakaways:
+def breakaways(logs: Sequence[Log], lag: float, slow: float) -> Breakaways:
     """Find every breakaway whose torque is known.
 
     The set point of the current gives the shape of the climb, free of noise; how far the measured
@@ -133,10 +130,8 @@ def breakaways(
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         With the motor's angle; those whose brake acted unmeasured are passed over.
-    keeps : sequence of ndarray of bool
-        Samples that may be used, one a log.
     lag : float
         Of the measured current behind the torque [s].
     slow : float
@@ -144,9 +139,9 @@ def breakaways(
     """
     events = [
         event
-        for log, keep in zip(logs, keeps, strict=True)
-        if log.motor is not None and log.brake.known in {"off", "torque"}
-        for event in _events(log, log.motor, keep & log.good, slow)
+        for log in logs
+        if log.has("motor_position") and log.brake.known in {"off", "torque"}
+        for event in _events(log, log.motor, slow)
     ]
     lines = np.array([event.line() for event in events], dtype=np.float64).reshape(-1, 2)
     direction = np.array([event.direction for event in events], dtype=np.float64)
@@ -172,15 +167,15 @@ def _behind(events: Sequence[_Event]) -> tuple[float, float, float]:
     return float(gap), float(offset), float(np.std(means) / np.sqrt(len(means)))
 
 
-def _events(log: BenchLog, motor: Floats, keep: Bools, slow: float) -> list[_Event]:
+def _events(log: Log, motor: Floats, slow: float) -> list[_Event]:
     least, most = round(_STUCK / log.period), round(_CLIMB / log.period)
-    noisy = log.current_target is log.current and log.current_signal == "current_q_meas"
+    noisy = not log.has("current_ref")
     tail = max(_TAIL, round(_NOISY_TAIL / log.period)) if noisy else _TAIL
     events = []
     for begin, end in stuck_stretches(motor, least, slow * log.period):
         instant = _instant(log, motor, end)
         part = slice(max(begin + 1, end - most), end + 1)
-        if instant is None or not keep[part].all():
+        if instant is None or not log.good[part].all():
             continue
         brake = np.interp(instant[0], log.brake.time, log.brake.level)
         events.append(
@@ -208,7 +203,7 @@ def stuck_stretches(motor: Floats, least: int, small: float) -> list[tuple[int, 
     return [(begin, end) for begin, end in pairs if end - begin >= least and end < len(motor) - 3]
 
 
-def _instant(log: BenchLog, motor: Floats, end: int) -> tuple[float, float] | None:
+def _instant(log: Log, motor: Floats, end: int) -> tuple[float, float] | None:
     """Instant and direction of the motion after sample `end`; None where it does not go on.
 
     Off a standstill the angle grows with the square of time: the roots of two samples point back

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.direct import DirectEstimate, direct_estimate
-from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError
+from elevon.estimate import Free
+from elevon.logs.log import Log
 from elevon.parameters.records import record_of
 from elevon.parameters.relations import emf_constant, motor_torque_constant, static_following
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["AUTO", "ParameterCandidate", "candidates", "start_values", "within_inertia"]
+__all__ = ["AUTO", "candidates", "start_values", "within_inertia"]
 
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (
@@ -37,53 +36,7 @@ _FAR = 100.0  # a start further off than this factor is a misfit of the regressi
 _KNOTS = 4  # of an unknown brake's level over a log
 
 
-@dataclass(frozen=True)
-class ParameterCandidate:
-    """One number that the dynamic fit may free.
-
-    Attributes
-    ----------
-    path : str
-        Parameter path, or ``sensor.current_offset``, ``sensor.speed_offset``,
-        ``sensor.speed_delay``, ``sensor.load_cell_offset``, ``load.brake[LOG][KNOT]``.
-    kind : str
-        ``parameter``, ``output`` (acts on a simulated signal) or ``input`` (acts on the brake).
-    register : str
-        As the core's records, for the report.
-    unit : str
-        SI.
-    log_scale : bool
-        Fitted as a logarithm.
-    low, high : float
-        Bounds.
-    size : float
-        A meaningful change: of the logarithm, or in SI.
-    index : tuple of int
-        Log and knot of an input.
-    """
-
-    path: str
-    kind: str
-    register: str
-    unit: str
-    log_scale: bool
-    low: float
-    high: float
-    size: float
-    index: tuple[int, ...] = ()
-
-    def inner(self, value: float) -> float:
-        """Return the fitted variable of a value."""
-        return math.log(value) if self.log_scale else value
-
-    def outer(self, x: float) -> float:
-        """Return the value of a fitted variable."""
-        return math.exp(x) if self.log_scale else x
-
-
-def candidates(
-    actuator: Actuator, logs: Sequence[BenchLog], free: Sequence[str] | None
-) -> list[ParameterCandidate]:
+def candidates(actuator: Actuator, logs: Sequence[Log], free: Sequence[str] | None) -> list[Free]:
     """List what may be freed: the caller's paths, or those of `AUTO` that the logs could determine.
 
     Raises
@@ -106,80 +59,64 @@ def candidates(
         ("sensor.speed_offset", "rad/s", speed, 0.01 * speed),
         ("sensor.speed_delay", "s", _DELAY, 1e-3),
     ]
-    if all(log.current_signal == "current_q_meas" for log in logs):
+    if all(log.has("torque_current") for log in logs):
         offsets.insert(0, ("sensor.current_offset", "A", current, 0.01 * current))
     items += [
-        ParameterCandidate(path, "output", "sensor", unit, False, -reach, reach, size)
+        Free(path, 0.0, size, -reach, reach, unit=unit, register="sensor", kind="output")
         for path, unit, reach, size in offsets
     ]
     return items + _brakes(logs)
 
 
-def _brakes(logs: Sequence[BenchLog]) -> list[ParameterCandidate]:
+def _brakes(logs: Sequence[Log]) -> list[Free]:
     """Offset of the load cell where another log shows the friction alone; unknown brakes."""
     items = []
     measured = [log for log in logs if log.brake.measured]
     if measured and any(log.brake.known == "off" for log in logs):
         top = max(float(log.brake.level.max()) for log in measured)
         items.append(
-            ParameterCandidate(
-                "sensor.load_cell_offset", "input", "sensor", "N m", False, -top, top, 0.01 * top
-            )
-        )
-    for k, log in enumerate(logs):
-        if log.brake.known in {"on", "force"}:
-            items += [
-                ParameterCandidate(
-                    f"load.brake[{log.name}][{j}]",
-                    "input",
-                    "load",
-                    "N m",
-                    False,
-                    0.0,
-                    100.0,
-                    0.1,
-                    (k, j),
-                )
-                for j in range(_KNOTS)
-            ]
+            Free("sensor.load_cell_offset", 0.0, 0.01 * top, -top, top, unit="N m",
+                 register="sensor", kind="input")
+        )  # fmt: skip
+    items += [
+        Free(f"load.brake[{log.name}][{j}]", 0.0, 0.1, 0.0, 100.0, unit="N m", register="load",
+             kind="input")
+        for log in logs
+        if log.brake.known in {"on", "force"}
+        for j in range(_KNOTS)
+    ]  # fmt: skip
     return items
 
 
-def _sensible(path: str, actuator: Actuator, logs: Sequence[BenchLog]) -> bool:
+def _sensible(path: str, actuator: Actuator, logs: Sequence[Log]) -> bool:
     if path == "motor.emf_constant":
         return any(log.brake.measured for log in logs)
     if path == "sensor.filter_cutoff":
-        return all(log.current_signal == "current_q_meas" for log in logs)
+        return all(log.has("torque_current") for log in logs)
     if path in {"control.integral_time", "control.derivative_time"}:
         return actuator.parameters.value(path) > 0.0
     return path in actuator.parameters
 
 
-def _parameter(path: str, actuator: Actuator) -> ParameterCandidate:
+def _parameter(path: str, actuator: Actuator) -> Free:
     record = record_of(actuator.wiring, path, "--free")
     if record.choices is not None:
         raise InputError(f"--free {path}: is a choice, not a number")
     if record.register == "solver" or path == "gear.ratio":
         raise InputError(f"--free {path}: belongs to the model's making, not to a log")
     value = actuator.parameters.value(path)
+    unit, register = record.unit, record.register
     if path == "sensor.filter_cutoff":
-        return ParameterCandidate(
-            path, "parameter", record.register, record.unit, True, *_FILTER, 0.3
-        )
+        return Free(path, value, 0.3, *_FILTER, True, unit, register)
     if value > 0.0 and record.minimum >= 0.0:
-        low = max(record.minimum, 1e-3 * value)
-        high = min(record.maximum, 1e3 * value)
-        return ParameterCandidate(
-            path, "parameter", record.register, record.unit, True, low, high, 0.1
-        )
+        ends = max(record.minimum, 1e-3 * value), min(record.maximum, 1e3 * value)
+        return Free(path, value, 0.1, *ends, True, unit, register)
     span = max(1.0, 10.0 * abs(value))
-    low, high = max(record.minimum, value - span), min(record.maximum, value + span)
-    return ParameterCandidate(
-        path, "parameter", record.register, record.unit, False, low, high, 0.01 * span
-    )
+    ends = max(record.minimum, value - span), min(record.maximum, value + span)
+    return Free(path, value, 0.01 * span, *ends, False, unit, register)
 
 
-def start_values(actuator: Actuator, logs: Sequence[BenchLog]) -> dict[str, float]:
+def start_values(actuator: Actuator, logs: Sequence[Log]) -> dict[str, float]:
     """Return first values in the model's parameters; those that make no sense are left out."""
     starts = direct_estimate(logs)
     kt = starts.torque_constant or motor_torque_constant(actuator.parameters)

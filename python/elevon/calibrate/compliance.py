@@ -9,17 +9,15 @@ of one weight share their errors and count as one block.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.blocks import block_covariance
-from elevon.calibrate.estimate import Estimate, quantile
-from elevon.calibrate.regression import robust_regression
 from elevon.errors import InputError, RangeError
+from elevon.estimate import Estimate
+from elevon.estimate.regression import huber, with_deviations
 
 __all__ = ["ComplianceCalibration", "calibrate_compliance"]
 
@@ -42,15 +40,6 @@ class ComplianceCalibration:
     estimates: tuple[Estimate, ...]
     residual: Floats
     outliers: tuple[int, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": "ok",
-            "parameters": {item.path: item.to_dict() for item in self.estimates},
-            "residual_rms": float(np.sqrt(np.mean(self.residual**2))),
-            "outliers": list(self.outliers),
-        }
 
 
 def calibrate_compliance(
@@ -89,51 +78,27 @@ def calibrate_compliance(
     _check(x, y, blocks, groups)
     labels = [label for label in np.unique(groups) if label != 0]
     design = np.column_stack((x, np.ones_like(x), *[(groups == k) * 1.0 for k in labels]))
-    beta, misfit, trust, _ = robust_regression(design, y)
+    beta, misfit, trust = huber(design, y)
     if not beta[0] > 0.0:
         raise RangeError("compliance: the loss does not grow with the load: no stiffness")
-    covariance, degrees = block_covariance(
-        design.T @ ((trust >= 1.0)[:, None] * design),
-        [design * (trust * misfit)[:, None]],
-        [blocks],
-    )
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    half = quantile(degrees) * std
-    stiffness = 1.0 / float(beta[0])
+    names = ("compliance", "derived.dead_zone", *(f"derived.group_offset[{k}]" for k in labels))
+    fit = with_deviations(names, beta, design, misfit, trust, strokes=blocks)
     # The compliance has the even interval; its inverse, the stiffness, an uneven one.
-    low = 1.0 / float(beta[0] + half[0])
-    high = 1.0 / float(beta[0] - half[0]) if beta[0] > half[0] else math.inf
-    estimates = [
-        Estimate(
-            "backlash.stiffness",
-            stiffness,
-            stiffness**2 * float(std[0]),
-            (low, high),
-            "N m/rad",
-            "plant",
-            old,
-            "direct",
-            (),
-            "loss regressed on load",
+    low, high = fit.estimate(names[0]).interval
+    ends = (1.0 / high, 1.0 / low if low > 0.0 else math.inf)
+    stiffness = replace(
+        fit.estimate(names[0]).inverted(), interval=ends, path="backlash.stiffness",
+        unit="N m/rad", register="plant", old=old, note="loss regressed on load",
+    )  # fmt: skip
+    notes = ("angle lost without load", *["lost beyond the common offset"] * len(labels))
+    others = [
+        replace(
+            fit.estimate(name), path=name, unit="rad", register="plant", note=note, in_set=False
         )
-    ]
-    names = ["derived.dead_zone", *(f"derived.group_offset[{k}]" for k in labels)]
-    estimates += [
-        Estimate(
-            name,
-            float(b),
-            float(s),
-            (float(b - h), float(b + h)),
-            "rad",
-            "plant",
-            note="angle lost without load" if k == 0 else "lost beyond the common offset",
-            method="direct",
-            in_set=False,
-        )
-        for k, (name, b, s, h) in enumerate(zip(names, beta[1:], std[1:], half[1:], strict=True))
+        for name, note in zip(names[1:], notes, strict=True)
     ]
     outliers = tuple(int(k) for k in np.flatnonzero(trust < 0.5))
-    return ComplianceCalibration(tuple(estimates), misfit, outliers)
+    return ComplianceCalibration((stiffness, *others), misfit, outliers)
 
 
 def _check(

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.log import BenchLog
+from elevon.estimate.regression import huber
+from elevon.logs.log import Log
 
-__all__ = ["DirectEstimate", "direct_estimate", "robust_lines", "saturated_speed"]
+__all__ = ["DirectEstimate", "direct_estimate", "saturated_speed"]
 
 _SLOW = 0.05  # of the highest speed: below it the direction of friction is not sure
 _WINDOW = 0.03  # s of the local parabolas that give acceleration
-_TURNS = 30
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class DirectEstimate:
     derivative: float
 
 
-def direct_estimate(logs: Sequence[BenchLog]) -> DirectEstimate:
+def direct_estimate(logs: Sequence[Log]) -> DirectEstimate:
     """Regress the current on motion, brake and control error over all logs."""
     plant = _plant(logs)
     control = _control(logs)
@@ -61,27 +61,7 @@ def direct_estimate(logs: Sequence[BenchLog]) -> DirectEstimate:
     )
 
 
-def robust_lines(design: Floats, target: Floats) -> Floats:
-    """Huber regression by reweighting; columns scaled, dependent ones get no weight."""
-    scale = np.linalg.norm(design, axis=0)
-    scaled = design / np.where(scale > 0.0, scale, 1.0)
-    weight = np.ones(len(target))
-    beta: Floats = np.zeros(design.shape[1])
-    for _ in range(_TURNS):
-        root = np.sqrt(weight)
-        solved, *_ = np.linalg.lstsq(scaled * root[:, None], target * root, rcond=1e-9)
-        fresh = np.asarray(solved, dtype=np.float64)
-        residual = target - scaled @ fresh
-        spread = 1.4826 * float(np.median(np.abs(residual))) or 1e-300
-        weight = np.minimum(1.0, 1.345 * spread / np.maximum(np.abs(residual), 1e-300))
-        if np.abs(fresh - beta).max() <= 1e-8 * (np.abs(fresh).max() or 1.0):
-            beta = fresh
-            break
-        beta = fresh
-    return np.asarray(beta / np.where(scale > 0.0, scale, 1.0), dtype=np.float64)
-
-
-def _smooth(log: BenchLog, values: Floats, order: int) -> Floats:
+def _smooth(log: Log, values: Floats, order: int) -> Floats:
     from scipy.signal import savgol_filter
 
     width = max(5, round(_WINDOW / log.period) | 1)
@@ -89,7 +69,7 @@ def _smooth(log: BenchLog, values: Floats, order: int) -> Floats:
     return np.asarray(savgol_filter(values, width, 2, deriv=order, delta=delta), dtype=np.float64)
 
 
-def _plant(logs: Sequence[BenchLog]) -> Floats:
+def _plant(logs: Sequence[Log]) -> Floats:
     rows, targets = [], []
     cell = any(log.brake.measured for log in logs)
     for k, log in enumerate(logs):
@@ -106,10 +86,10 @@ def _plant(logs: Sequence[BenchLog]) -> Floats:
         targets.append(_smooth(log, log.current, 0)[keep])
     if not rows:
         return np.zeros(4)
-    return robust_lines(np.vstack(rows), np.concatenate(targets))
+    return huber(np.vstack(rows), np.concatenate(targets))[0]
 
 
-def _control(logs: Sequence[BenchLog]) -> Floats:
+def _control(logs: Sequence[Log]) -> Floats:
     rows, targets = [], []
     for k, log in enumerate(logs):
         error = log.speed_ref - log.speed
@@ -122,10 +102,10 @@ def _control(logs: Sequence[BenchLog]) -> Floats:
         keep = log.good & inside
         rows.append(np.column_stack(columns)[keep])
         targets.append(_smooth(log, log.current, 0)[keep])
-    return robust_lines(np.vstack(rows), np.concatenate(targets))
+    return huber(np.vstack(rows), np.concatenate(targets))[0]
 
 
-def saturated_speed(log: BenchLog) -> float:
+def saturated_speed(log: Log) -> float:
     """Level at which the set point is held flat [rad/s]; infinite where it never is."""
     top = float(np.abs(log.speed_ref).max())
     flat = np.abs(log.speed_ref) > top * (1.0 - 1e-4)

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.calibrate.candidates import ParameterCandidate, candidates, start_values, within_inertia
-from elevon.calibrate.estimate import Estimate, quantile
-from elevon.calibrate.fit import (
-    DynamicFit,
-    blocks_of,
-    fit_dynamic,
-    refresh_scales,
-    step_sizes,
-)
-from elevon.calibrate.identify import Identifiability, choose
-from elevon.calibrate.log import BenchLog
-from elevon.calibrate.problem import Problem, values_of
+from elevon.arrays import Floats
+from elevon.calibrate.candidates import candidates, start_values, within_inertia
+from elevon.calibrate.identify import Identifiability, SensitivityTable, choose
+from elevon.calibrate.named import named
+from elevon.calibrate.speed_runs import SpeedRuns
 from elevon.errors import Interrupted
+from elevon.estimate import Estimate, Free, quantile
+from elevon.estimate.covariance import block_covariance
+from elevon.estimate.free import inner, outer
+from elevon.estimate.lanes import Lanes
+from elevon.logs.log import Log
 from elevon.parameters.relations import constant_is_tied, static_following
 from elevon.progress import Progress
 
@@ -33,7 +31,10 @@ __all__ = ["Dynamic", "dynamic_stage"]
 Bools = npt.NDArray[np.bool_]
 _ABSORBS = 0.02  # relative difference to the direct estimate that is worth a name
 _SIGMAS = 2.0  # deviations it must also exceed
-_MOST = 12  # evaluations: the regressions start it close by
+_ROUNDS = 12  # of the fit: the regressions start it close by
+_CLOUD = 32  # starts tried where the first values explain too little
+_EXPLAINED = 0.5  # share of the current's variance the first values must explain
+_KEEP = 3  # starts that go on
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,20 @@ class Dynamic:
     ----------
     ranking : Identifiability
         Of the candidates, before the fit.
-    fit : DynamicFit
-        With every determined candidate free.
+    free : tuple of Free
+        What was fitted.
+    x : ndarray, shape (p,)
+        Solution, in spreads.
+    covariance : ndarray, shape (p, p)
+        Of `x`, for coloured residuals.
+    degrees : float
+        Degrees of freedom of the covariance.
+    cost : float
+        Mean robust cost a sample.
+    converged : bool
+        Whether the cost had settled.
+    at_bound : tuple of str
+        Parameters that ended at a bound.
     drive : str
         Kind of drive whose model explains the logs better.
     absorbed : tuple of (str, float, float)
@@ -58,22 +71,26 @@ class Dynamic:
     """
 
     ranking: Identifiability
-    fit: DynamicFit
+    free: tuple[Free, ...]
+    x: Floats
+    covariance: Floats
+    degrees: float
+    cost: float
+    converged: bool
+    at_bound: tuple[str, ...]
     drive: str
     absorbed: tuple[tuple[str, float, float], ...]
     rms: tuple[tuple[str, float, float], ...]
     runs: int
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain types."""
         return {
             "drive": self.drive,
-            "values": self.fit.values,
-            "cost": self.fit.cost,
-            "converged": self.fit.converged,
-            "at_bound": list(self.fit.at_bound),
-            "exact_derivatives": list(self.fit.exact),
-            "evaluations": self.fit.evaluations,
+            "values": outer(self.free, self.x),
+            "cost": self.cost,
+            "converged": self.converged,
+            "at_bound": list(self.at_bound),
             "runs": self.runs,
             "absorbed": [{"path": p, "simulation": a, "direct": b} for p, a, b in self.absorbed],
             "rms": [{"log": n, "speed": s, "current": c} for n, s, c in self.rms],
@@ -83,40 +100,29 @@ class Dynamic:
         self, actuator: Actuator, known: Sequence[str], free: Sequence[str] | None
     ) -> list[Estimate]:
         """Estimates of what has no direct one."""
-        std = np.sqrt(np.maximum(np.diag(self.fit.covariance), 0.0))
         estimates = []
-        for item, x, s in zip(self.fit.free, self.fit.x, std, strict=True):
-            if item.path in known or (item.kind == "parameter" and not _wanted(item.path, free)):
+        std = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        for item, x, s in zip(self.free, map(float, self.x), std, strict=True):
+            wanted = free is None or item.path in free
+            if item.path in known or (item.kind == "parameter" and not wanted):
                 continue
-            half = quantile(self.fit.degrees) * float(s)
-            value = item.outer(float(x))
-            ends = (item.outer(float(x) - half), item.outer(float(x) + half))
-            in_set = item.kind == "parameter"
+            half = quantile(self.degrees) * float(s)
+            number = Estimate(
+                item.outer(x), item.slope(x) * float(s),
+                interval=(item.outer(x - half), item.outer(x + half)),
+            )  # fmt: skip
+            note = "ended at its bound" if item.path in self.at_bound else ""
             estimates.append(
-                Estimate(
-                    item.path,
-                    value,
-                    value * float(s) if item.log_scale else float(s),
-                    ends,
-                    item.unit,
-                    item.register,
-                    actuator.parameters.value(item.path) if in_set else None,
-                    "simulation",
-                    (),
-                    "ended at its bound" if item.path in self.fit.at_bound else "",
-                    in_set,
+                named(
+                    number, item.path, actuator, note, source="simulation", unit=item.unit,
+                    register=item.register,
                 )
-            )
+            )  # fmt: skip
         return [item for item in estimates if np.isfinite(item.std)]
 
 
-def _wanted(path: str, free: Sequence[str] | None) -> bool:
-    return free is None or path in free
-
-
 def dynamic_stage(
-    logs: Sequence[BenchLog],
-    keeps: Sequence[Bools],
+    logs: Sequence[Log],
     actuator: Actuator,
     known: Sequence[Estimate],
     free: Sequence[str] | None,
@@ -131,101 +137,118 @@ def dynamic_stage(
     Dynamic or None
         None where the logs determine nothing of what could be freed.
     """
+    at = 0.0
 
     def check() -> bool:
-        return progress is None or progress(state[0])
+        return progress is None or progress(at)
 
-    state = [0.0]
+    def advance(fraction: float) -> None:
+        nonlocal at
+        at = fraction
+        if not check():
+            raise Interrupted("calibration stopped")
+
     required = [p for p in free or () if p not in {item.path for item in known}]
     chosen = candidates(actuator, logs, free)
     start = start_values(actuator, logs)
     start |= {item.path: item.value for item in known if item.value != 0.0}
-    problem = _best_drive(logs, keeps, actuator, chosen, start, fidelity=fidelity, check=check)
-    x = _point(chosen, start, problem.actuator)
-    refresh_scales(problem, values_of(chosen, x))
-    state[0] = 0.1
-    residual = problem.residual(problem.simulate([values_of(chosen, x)])[0])
-    jac = problem.jacobian(chosen, x, step_sizes(chosen))
-    determined, ranking = choose(chosen, jac, residual, blocks_of(problem, residual), required)
-    state[0] = 0.3
+    problem = _best_drive(logs, actuator, chosen, start, fidelity=fidelity, check=check)
+    lanes, x = problem.lanes(chosen), inner(chosen, start)
+    lanes.refresh(x)
+    advance(0.1)
+    point = lanes.point(x)
+    sensitivity = SensitivityTable(
+        tuple(chosen), lanes.jacobian([point], central=True)[0], point.residual,
+        lanes.blocks(point.residual),
+    )  # fmt: skip
+    determined, ranking = choose(sensitivity, required)
+    advance(0.3)
     if not determined:
         return None
+    return _fitted(problem, [chosen[k] for k in determined], start, ranking, known, advance)
 
-    def advance(fraction: float) -> None:
-        state[0] = 0.3 + 0.7 * fraction
-        if not check():
-            raise Interrupted("calibration stopped")
 
-    fit = fit_dynamic(
-        problem,
-        [chosen[k] for k in determined],
-        x[determined],
-        most=_MOST,
-        finite=[part[:, :, determined] for part in jac],
-        advance=advance,
+def _fitted(  # noqa: PLR0917 - what the stage has made so far
+    problem: SpeedRuns,
+    free: Sequence[Free],
+    start: Mapping[str, float],
+    ranking: Identifiability,
+    known: Sequence[Estimate],
+    advance: Callable[[float], None],
+) -> Dynamic:
+    lanes, x = problem.lanes(free), inner(free, start)
+    lanes.refresh(x)
+    best = lanes.solve(
+        _starts(lanes, x), rounds=_ROUNDS, keep=_KEEP, central=True,
+        advance=lambda f: advance(0.3 + 0.65 * f),
+    )[0]  # fmt: skip
+    point = lanes.point(best.x)
+    jac, weight = lanes.jacobian([point], central=True)[0], lanes.weight(point.residual)
+    scores = weight * point.residual
+    covariance, degrees = block_covariance(
+        jac.T @ (weight[:, None] * jac), jac * scores[:, None], lanes.blocks(scores)
     )
+    ends = np.minimum(point.x - lanes.low, lanes.high - point.x) < 1e-3
+    advance(1.0)
     return Dynamic(
         ranking=ranking,
-        fit=fit,
+        free=tuple(free),
+        x=point.x,
+        covariance=covariance,
+        degrees=degrees,
+        cost=point.cost / max(float(lanes.share.sum()), 1.0),
+        converged=best.slow or best.settled,
+        at_bound=tuple(item.path for item, end in zip(free, ends, strict=True) if end),
         drive=str(problem.actuator.parameters["drive.kind"].value),
-        absorbed=_absorbed(fit, known),
-        rms=_rms(problem, fit),
+        absorbed=_absorbed(free, point.x, np.sqrt(np.diag(covariance)), known),
+        rms=_rms(problem, lanes, point.residual),
         runs=problem.runs,
     )
 
 
-def _point(
-    free: Sequence[ParameterCandidate], start: dict[str, float], actuator: Actuator
-) -> npt.NDArray[np.float64]:
-    x = []
-    for item in free:
-        value = start.get(item.path)
-        if value is None:
-            value = actuator.parameters.value(item.path) if item.kind == "parameter" else 0.0
-            value = max(value, item.low) if item.log_scale else value
-        if item.log_scale:
-            value = min(max(value, item.low), item.high)
-        x.append(item.inner(value))
-    return np.array(x)
+def _starts(lanes: Lanes, x: Floats) -> Floats:
+    """Keep the start where it explains the current; else add a cloud around it."""
+    misfit = total = 0.0
+    for item, values in zip(lanes.channels, lanes.predicted(x), strict=True):
+        if "current" in item.name and values is not None:
+            misfit += float(np.sum((values - item.data) ** 2))
+            total += float(np.sum((item.data - item.data.mean()) ** 2))
+    if total > 0.0 and 1.0 - misfit / total > _EXPLAINED:
+        return x[None, :]
+    from scipy.stats import qmc
+
+    cloud = qmc.Sobol(len(x), seed=0).random(_CLOUD)
+    reach = np.array([np.log(10.0) / f.spread if f.log_scale else 0.0 for f in lanes.free])
+    return np.vstack((x, np.clip(x + (2.0 * cloud - 1.0) * reach, lanes.low, lanes.high)))
 
 
 def _best_drive(
-    logs: Sequence[BenchLog],
-    keeps: Sequence[Bools],
+    logs: Sequence[Log],
     actuator: Actuator,
-    free: Sequence[ParameterCandidate],
-    start: dict[str, float],
+    free: Sequence[Free],
+    start: Mapping[str, float],
     *,
     fidelity: str,
-    check: Any,
-) -> Problem:
+    check: Callable[[], bool],
+) -> SpeedRuns:
     """The file's drive, or the carrier PWM of a real one, whichever explains the logs better."""
     nominal = str(actuator.parameters["drive.kind"].value)
-    kinds = [nominal, *(kind for kind in ("pwm",) if kind != nominal)]
-    problems = []
-    for kind in kinds:
-        changed = actuator.with_values({**_fixed(start, actuator, free), "drive.kind": kind})
-        problem = Problem(
-            changed,
-            logs,
-            fidelity,
-            check,
-            constant_is_tied(actuator.parameters, 0.01),
-            masks=[keep.copy() for keep in keeps],
-        )
-        values = values_of(free, _point(free, start, changed))
-        misfit = problem.residual(problem.simulate([values])[0])
-        cost = sum(float(np.sum(np.minimum(np.abs(r), 10.0))) for r in misfit)
-        problems.append((cost, problem))
-    best, other = problems[0], problems[-1]
-    return other[1] if other[0] < best[0] else best[1]
+    tied = constant_is_tied(actuator.parameters, 0.01)
+    fixed, x = _fixed(start, actuator, free), inner(free, start)
+    tried = []
+    for kind in dict.fromkeys((nominal, "pwm")):
+        changed = actuator.with_values({**fixed, "drive.kind": kind})
+        problem = SpeedRuns(changed, logs, fidelity, check, tied=tied)
+        residual = problem.lanes(free).residual(x[None, :])[0]
+        tried.append((float(np.sum(np.minimum(np.abs(residual), 10.0))), problem))
+    return min(tried, key=lambda item: item[0])[1]
 
 
 def _fixed(
-    start: dict[str, float], actuator: Actuator, free: Sequence[ParameterCandidate]
+    start: Mapping[str, float], actuator: Actuator, free: Sequence[Free]
 ) -> dict[str, str | float]:
     """Known values of parameters the model runs keep fixed."""
-    taken = {item.path for item in free}
+    taken = {item.path for item in free} | {"backlash.total", "sensor.encoder.offset"}
     values: dict[str, str | float] = {
         p: v for p, v in start.items() if p in actuator.parameters and p not in taken
     }
@@ -233,33 +256,34 @@ def _fixed(
         static = static_following(actuator.parameters, start["friction.dynamic"])
         values.setdefault("friction.static", static)
         values.setdefault("friction.dynamic", start["friction.dynamic"])
-    fixed = {
-        p: v for p, v in values.items() if p not in {"backlash.total", "sensor.encoder.offset"}
-    }
-    return fixed | within_inertia(actuator, fixed)
+    return values | within_inertia(actuator, values)
 
 
-def _absorbed(fit: DynamicFit, known: Sequence[Estimate]) -> tuple[tuple[str, float, float], ...]:
+def _absorbed(
+    free: Sequence[Free], x: Floats, std: Floats, known: Sequence[Estimate]
+) -> tuple[tuple[str, float, float], ...]:
     direct = {item.path: item for item in known}
-    std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     absorbed = []
-    for item, x, s in zip(fit.free, fit.x, std, strict=True):
+    for item, at, s in zip(free, map(float, x), std, strict=True):
         other = direct.get(item.path)
         if other is None or not item.log_scale or not other.value > 0.0:
             continue
-        gap = float(x) - item.inner(other.value)
-        noise = float(np.hypot(s, other.std / other.value))
+        gap = (at - item.inner(other.value)) * item.spread
+        noise = float(np.hypot(s * item.spread, other.std / other.value))
         if abs(gap) > _ABSORBS and abs(gap) > _SIGMAS * noise:
-            absorbed.append((item.path, item.outer(float(x)), other.value))
+            absorbed.append((item.path, item.outer(at), other.value))
     return tuple(sorted(absorbed, key=lambda row: -abs(np.log(row[1] / row[2]))))
 
 
-def _rms(problem: Problem, fit: DynamicFit) -> tuple[tuple[str, float, float], ...]:
-    rows = []
-    runs = problem.simulate([fit.values])[0]
-    for log, run, mask in zip(problem.logs, runs, problem.masks, strict=True):
-        if run is not None:
-            speed = float(np.sqrt(np.mean((run.speed - log.speed)[mask] ** 2)))
-            current = float(np.sqrt(np.mean((run.current - log.current)[mask] ** 2)))
-            rows.append((log.name, speed, current))
-    return tuple(rows)
+def _rms(
+    problem: SpeedRuns, lanes: Lanes, residual: Floats
+) -> tuple[tuple[str, float, float], ...]:
+    """RMS errors of speed and current, log by log."""
+    sizes = [
+        scale * float(np.sqrt(np.mean(residual[place] ** 2)))
+        for place, scale in zip(lanes.slices, lanes.scales, strict=True)
+    ]
+    return tuple(
+        (log.name, *pair)
+        for log, pair in zip(problem.logs, zip(sizes[::2], sizes[1::2], strict=True), strict=True)
+    )

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.dynamic import Dynamic
-from elevon.calibrate.estimate import Estimate
 from elevon.calibrate.kinematics import CommandFit
-from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import Torque
-from elevon.calibrate.regression import Regression
+from elevon.estimate import Estimate
+from elevon.estimate.regression import Regression
+from elevon.logs.log import Log
 from elevon.parameters.relations import motor_torque_constant
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _POOR = 0.8  # explained share below which a regression is doubtful
 
 
 def plant_findings(
-    logs: Sequence[BenchLog],
+    logs: Sequence[Log],
     plant: Regression | None,
     torque: Torque,
     dynamic: Dynamic | None,
@@ -70,14 +70,14 @@ def plant_findings(
             f"the signals themselves say {b:.5g}"
             for path, a, b in dynamic.absorbed
         ]
-        says += [f"{path}: the model runs end at its bound" for path in dynamic.fit.at_bound]
+        says += [f"{path}: the model runs end at its bound" for path in dynamic.at_bound]
         known = {item.path for item in estimates}
         says += [
             f"{path} is not determined: {why}"
             for path, why in dynamic.ranking.dropped.items()
             if path not in known
         ]
-        if not dynamic.fit.converged:
+        if not dynamic.converged:
             says.append("the fit on model runs stopped before its tolerance was met")
     return says
 
@@ -101,7 +101,14 @@ def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estim
     """Name a constant amplitude factor between the bench and the model, and where it sits."""
     says = []
     backlash = next((item for item in estimates if item.path == "backlash.total"), None)
-    if backlash is not None and "floats" in backlash.note:
+    if backlash is not None and "under load" in backlash.note:
+        says.append(
+            "the difference of the two positions holds both the backlash and the transmission's "
+            f"compliance ({backlash.note}): backlash.total comes from the stretches that agree "
+            "with each other; backlash.stiffness needs the loads that were hung, as a table of "
+            "drops; encoder gain and delay cannot be determined"
+        )
+    elif backlash is not None and "floats" in backlash.note:
         says.append(
             "the output is not carried through the backlash by friction but moves within it on its "
             "own (its inertia is not small against its friction): backlash.total comes from the "

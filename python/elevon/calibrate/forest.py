@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from elevon.calibrate.estimate import Estimate
+from elevon.estimate import Estimate
 from elevon.report.figures import COLOURS, new_figure
 
 if TYPE_CHECKING:

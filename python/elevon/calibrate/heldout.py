@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.balance import torque_balance
 from elevon.calibrate.law import controller_law
-from elevon.calibrate.log import BenchLog
 from elevon.calibrate.plant import controller_estimates, plant_estimates, torque_scale
-from elevon.calibrate.problem import Problem
-from elevon.errors import Interrupted
+from elevon.calibrate.speed_runs import SpeedRuns
+from elevon.errors import InputError
+from elevon.estimate.held_out import held_out as left_out
+from elevon.logs.log import Log
 from elevon.parameters.relations import static_following
+from elevon.plain import Plain, in_unit, key
 from elevon.progress import Progress
 
 if TYPE_CHECKING:
@@ -24,11 +26,12 @@ if TYPE_CHECKING:
 __all__ = ["HeldOut", "held_out"]
 
 Bools = npt.NDArray[np.bool_]
+_OFFSETS = ("sensor.current_offset",)
 _LAST = 0.25  # of a single log that is kept from the fit
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOut(Plain):
     """Error on data kept from the fit.
 
     Attributes
@@ -45,63 +48,35 @@ class HeldOut:
 
     log: str
     span: str
-    speed: float
-    current: float
-    speed_all: float
-    current_all: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain types."""
-        return {
-            "log": self.log,
-            "span": self.span,
-            "speed_rms": self.speed,
-            "current_rms": self.current,
-            "speed_rms_all_data": self.speed_all,
-            "current_rms_all_data": self.current_all,
-        }
+    speed: Annotated[float, key("speed_rms"), in_unit("rad/s")]
+    current: Annotated[float, key("current_rms"), in_unit("A")]
+    speed_all: Annotated[float, key("speed_rms_all_data"), in_unit("rad/s")]
+    current_all: Annotated[float, key("current_rms_all_data"), in_unit("A")]
 
 
 def held_out(
-    logs: Sequence[BenchLog],
-    keeps: Sequence[Bools],
-    before: Actuator,
-    fitted: Actuator,
-    progress: Progress | None,
+    logs: Sequence[Log], before: Actuator, fitted: Actuator, progress: Progress | None
 ) -> tuple[HeldOut, ...]:
     """Refit without each log in turn, or without the last quarter of a single one."""
-    errors = []
-    for k, log in enumerate(logs):
-        if progress is not None and not progress(k / len(logs)):
-            raise Interrupted("calibration stopped")
-        if len(logs) > 1:
-            train = [keep & (j != k) for j, keep in enumerate(keeps)]
-            test, span = keeps[k], "all"
-        else:
-            late = log.time > (1.0 - _LAST) * log.duration
-            train, test, span = [keeps[0] & ~late], keeps[0] & late, "last quarter"
-        row = _one(logs, train, k, test, span=span, before=before, fitted=fitted)
-        if row is not None:
-            errors.append(row)
-    return tuple(errors)
+    parts, spans = list(logs), ["all"] * len(logs)
+    if len(logs) == 1:
+        late = logs[0].time > (1.0 - _LAST) * logs[0].duration
+        parts, spans = [logs[0].counting(late), logs[0].counting(~late)], ["last quarter"]
+
+    def judge(log: Log, values: dict[str, float], _share: Progress | None) -> HeldOut | None:
+        return _errors(log, values, fitted)
+
+    rows = left_out(parts, lambda others: _refitted(others, before, fitted), judge, progress)
+    pairs = zip(spans, rows, strict=False)
+    return tuple(replace(row, span=span) for span, (_, row) in pairs if row is not None)
 
 
-def _one(
-    logs: Sequence[BenchLog],
-    train: Sequence[Bools],
-    k: int,
-    test: Bools,
-    *,
-    span: str,
-    before: Actuator,
-    fitted: Actuator,
-) -> HeldOut | None:
-    others = [j for j in range(len(logs)) if train[j].any()]
-    some, masks = [logs[j] for j in others], [train[j] for j in others]
-    plant = torque_balance(some, masks)
-    law = controller_law(some, masks, 0.0 if plant is None else plant["lag"])
+def _refitted(some: Sequence[Log], before: Actuator, fitted: Actuator) -> dict[str, float]:
+    """Values of the regressions on some logs, and the sensors' offsets."""
+    plant = torque_balance(some)
+    law = controller_law(some, 0.0 if plant is None else plant["lag"])
     if plant is None or law is None:
-        return None
+        raise InputError("the logs move too little for both regressions")
     torque = torque_scale(fitted, plant)
     estimates, followed = plant_estimates(before, plant, torque)
     estimates += controller_estimates(before, law, torque, [log.name for log in some])
@@ -111,20 +86,21 @@ def _one(
     dynamic = values.get("friction.dynamic", fitted.parameters.value("friction.dynamic"))
     values["friction.static"] = static_following(fitted.parameters, dynamic)
     values["control.torque_constant"] = torque.believed
-    offsets = {i.path: i.value for i in estimates if i.path == "sensor.current_offset"}
+    offsets = {i.path: i.value for i in estimates if i.path in _OFFSETS}
+    return values | offsets
+
+
+def _errors(log: Log, values: dict[str, float], fitted: Actuator) -> HeldOut | None:
+    """RMS errors of speed and current, by these values and by those fitted to everything."""
     known = (fitted.validation or {}).get("offsets", {})
+    offsets = {path: values[path] for path in _OFFSETS if path in values}
     offsets["sensor.speed_offset"] = known.get("motor_speed", 0.0)
-    problem = Problem(fitted, [logs[k]], tied=False, masks=[test])
-    runs = problem.simulate([values | offsets, offsets])
-    pairs = []
-    for (run,) in runs:
+    errors = []
+    for (run,) in SpeedRuns(fitted, [log], tied=False).simulate([values | offsets, offsets]):
         if run is None:
             return None
-        pairs.append(
-            (_rms(run.speed - logs[k].speed, test), _rms(run.current - logs[k].current, test))
-        )
-    (speed, current), (speed_all, current_all) = pairs
-    return HeldOut(logs[k].name, span, speed, current, speed_all, current_all)
+        errors += [_rms(run.speed - log.speed, log.good), _rms(run.current - log.current, log.good)]
+    return HeldOut(log.name, "", *errors)
 
 
 def _rms(error: npt.NDArray[np.float64], mask: Bools) -> float:

@@ -3,27 +3,109 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.blocks import block_covariance
-from elevon.calibrate.candidates import ParameterCandidate
 from elevon.errors import InputError
+from elevon.estimate import Free
+from elevon.estimate.covariance import Ints, block_covariance
+from elevon.plain import Plain, key
 
-__all__ = ["Identifiability", "choose", "rank"]
+__all__ = ["Identifiability", "SensitivityTable", "choose", "rank"]
 
+Bools = npt.NDArray[np.bool_]
 _CORRELATED = 0.95
-_LOOSEST = 0.25  # relative deviation (or of the size of an offset's meaning) still worth freeing
+_LOOSEST = 0.25  # relative deviation (or of ten meaningful changes) still worth freeing
 _HOPELESS = 1.0  # the same, above which a requested parameter is refused
 _SAME = 0.995  # correlation at which two parameters are one
+_BOUND = 3.0  # deviations beyond which a residual counts no more
+_OFFSETS = 10.0  # meaningful changes of an offset or a delay that count as one of a number's size
 
 
 @dataclass(frozen=True)
-class Identifiability:
+class SensitivityTable:
+    """What changes of the free parameters do to the residuals.
+
+    Attributes
+    ----------
+    free : tuple of Free
+        Candidates.
+    jacobian : ndarray, shape (n, p)
+        Deviations of the residual a meaningful change.
+    residual : ndarray, shape (n,)
+        In deviations.
+    blocks : ndarray of int, shape (n,)
+        Of each sample.
+    """
+
+    free: tuple[Free, ...]
+    jacobian: Floats
+    residual: Floats
+    blocks: Ints
+
+    def only(self, left: Sequence[int]) -> SensitivityTable:
+        """Return that of some candidates."""
+        chosen = tuple(self.free[k] for k in left)
+        return replace(self, free=chosen, jacobian=self.jacobian[:, list(left)])
+
+    def covariance(self) -> Floats:
+        """Covariance that a fit would have, shape (p, p), in meaningful changes."""
+        scores = self.jacobian * np.clip(self.residual, -_BOUND, _BOUND)[:, None]
+        return block_covariance(self.jacobian.T @ self.jacobian, scores, self.blocks)[0]
+
+
+@dataclass(frozen=True)
+class _Spread:
+    """Deviations and correlations of candidates, from their covariance."""
+
+    free: tuple[Free, ...]
+    std: Floats
+    correlation: Floats
+
+    @classmethod
+    def of(cls, table: SensitivityTable) -> _Spread:
+        covariance = table.covariance()
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        if not np.isfinite(std).all() or not std.all():
+            return cls(table.free, std, np.ones_like(covariance))
+        correlation = covariance / np.outer(std, std)
+        np.fill_diagonal(correlation, 0.0)
+        return cls(table.free, std, correlation)
+
+    @property
+    def finite(self) -> bool:
+        return bool(np.isfinite(self.std).all() and self.std.all())
+
+    @property
+    def loose(self) -> Floats:
+        """Relative deviation; offsets and delays count in ten meaningful changes."""
+        sizes = [item.spread if item.log_scale else 1.0 / _OFFSETS for item in self.free]
+        return np.asarray(np.where(np.isfinite(self.std), self.std * sizes, np.inf))
+
+    @property
+    def blind(self) -> Bools:
+        """Which cannot be told from another one, even where both look tight."""
+        return np.asarray(np.abs(self.correlation).max(axis=0) > _SAME)
+
+    def reason(self, j: int) -> str:
+        """Why one is not determined."""
+        loose = float(self.loose[j])
+        if not self.finite:
+            return "it cannot be determined from the others"
+        text = f"its deviation would be {100.0 * loose:.0f} %"
+        other = int(np.argmax(np.abs(self.correlation[j])))
+        if abs(self.correlation[j, other]) > _CORRELATED:
+            name, size = self.free[other].path, self.correlation[j, other]
+            text += f", and it cannot be determined from {name} ({size:+.3f})"
+        return text
+
+
+@dataclass(frozen=True)
+class Identifiability(Plain):
     """Ranking of the candidates at the first values.
 
     Attributes
@@ -43,58 +125,46 @@ class Identifiability:
     singular_values: Floats
     weakest: tuple[tuple[str, float], ...]
     predicted: dict[str, float]
-    pairs: tuple[tuple[str, str, float], ...]
+    pairs: Annotated[tuple[tuple[str, str, float], ...], key("correlated")]
     dropped: dict[str, str]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain types."""
-        return {
-            "singular_values": self.singular_values.tolist(),
-            "condition": float(self.singular_values[0] / max(self.singular_values[-1], 1e-300)),
-            "weakest": [list(item) for item in self.weakest],
-            "predicted": self.predicted,
-            "correlated": [list(pair) for pair in self.pairs],
-            "dropped": self.dropped,
-        }
+    COMPUTED: ClassVar = ("condition",)
+
+    @property
+    def condition(self) -> float:
+        """Largest over least singular value."""
+        return float(self.singular_values[0] / max(self.singular_values[-1], 1e-300))
 
 
-def rank(
-    free: Sequence[ParameterCandidate],
-    jac: Sequence[Floats],
-    residual: Sequence[Floats],
-    blocks: Sequence[npt.NDArray[np.int64]],
-    dropped: dict[str, str] | None = None,
-) -> Identifiability:
-    """Rank candidates by the sensitivities `jac`, (n, 2, p) a log, at residuals (n, 2)."""
-    sizes = np.array([item.size for item in free])
-    stacked = np.vstack([part.reshape(-1, len(free)) for part in jac]) * sizes
-    _, singular, directions = np.linalg.svd(stacked, full_matrices=False)
-    covariance = _covariance(jac, residual, blocks)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    names = [item.path for item in free]
+def rank(table: SensitivityTable, dropped: dict[str, str] | None = None) -> Identifiability:
+    """Rank candidates by what they do to the residuals."""
+    names = [item.path for item in table.free]
+    _, singular, directions = np.linalg.svd(table.jacobian, full_matrices=False)
+    spread = _Spread.of(table)
     order = np.argsort(-np.abs(directions[-1]))[:4]
+    pairs = [
+        (names[i], names[j], float(spread.correlation[i, j]))
+        for i in range(len(names))
+        for j in range(i)
+        if spread.finite and abs(spread.correlation[i, j]) > _CORRELATED
+    ]
+    sizes = spread.std * [item.spread for item in table.free]
     return Identifiability(
         singular_values=singular,
         weakest=tuple((names[k], float(directions[-1][k])) for k in order),
-        predicted=dict(zip(names, map(float, std), strict=True)),
-        pairs=_pairs(names, covariance, std),
+        predicted=dict(zip(names, map(float, sizes), strict=True)),
+        pairs=tuple(sorted(pairs, key=lambda item: -abs(item[2]))),
         dropped=dict(dropped or {}),
     )
 
 
-def choose(
-    free: Sequence[ParameterCandidate],
-    jac: Sequence[Floats],
-    residual: Sequence[Floats],
-    blocks: Sequence[npt.NDArray[np.int64]],
-    required: Sequence[str],
-) -> tuple[list[int], Identifiability]:
+def choose(table: SensitivityTable, required: Sequence[str]) -> tuple[list[int], Identifiability]:
     """Drop, one by one, what the logs cannot determine; return the indices kept, maybe none.
 
     Parameters
     ----------
-    free, jac, residual, blocks
-        As `rank`.
+    table : SensitivityTable
+        Of all candidates.
     required : sequence of str
         Paths requested: never dropped.
 
@@ -104,116 +174,38 @@ def choose(
         A required parameter that nothing in the logs excites, or that cannot be determined from
         others.
     """
-    left = list(range(len(free)))
-    dropped: dict[str, str] = {}
-    whole = np.vstack([part.reshape(-1, len(free)) for part in jac])
-    strength = np.linalg.norm(whole, axis=0) * [item.size for item in free]
-    for k in list(left):
-        if not strength[k] > 1e-6 * np.sqrt(len(whole)):
-            if free[k].path in required:
-                raise InputError(
-                    f"--free {free[k].path}: nothing in the logs excites it (a change of "
-                    f"{free[k].size:g} moves no signal); leave it out or add a log that does"
-                )
-            dropped[free[k].path] = "nothing in the logs excites it"
-            left.remove(k)
+    free = table.free
+    dropped = _unexcited(table, required)
+    left = [k for k, item in enumerate(free) if item.path not in dropped]
     while left:
-        covariance = _covariance([part[:, :, left] for part in jac], residual, blocks)
-        loose = _looseness([free[k] for k in left], covariance)
-        optional = [j for j, k in enumerate(left) if free[k].path not in required]
-        # Of two that cannot be determined apart, the looser one goes, even where both look tight.
-        blind = np.array([_twin(covariance, j) > _SAME for j in range(len(left))])
-        worst = max(optional, key=lambda j: (blind[j], loose[j]), default=None)
-        if worst is None or not (blind[worst] or loose[worst] > _LOOSEST):
+        spread = _Spread.of(table.only(left))
+        optional = [j for j, item in enumerate(spread.free) if item.path not in required]
+        # Of two that cannot be determined apart, the looser one goes.
+        worst = max(optional, key=lambda j: (spread.blind[j], spread.loose[j]), default=None)
+        if worst is None or not (spread.blind[worst] or spread.loose[worst] > _LOOSEST):
             break
-        index = left[worst]
-        dropped[free[index].path] = _reason(
-            [free[k] for k in left], covariance, worst, loose[worst]
-        )
-        left.remove(index)
+        dropped[spread.free[worst].path] = spread.reason(worst)
+        del left[worst]
     if not left:
         return [], Identifiability(np.empty(0), (), {}, (), dropped)
-    _refuse(free, left, jac, residual, blocks, required=required)
-    chosen = [free[k] for k in left]
-    ranking = rank(chosen, [part[:, :, left] for part in jac], residual, blocks, dropped)
-    return left, ranking
-
-
-def _refuse(
-    free: Sequence[ParameterCandidate],
-    left: Sequence[int],
-    jac: Sequence[Floats],
-    residual: Sequence[Floats],
-    blocks: Sequence[npt.NDArray[np.int64]],
-    *,
-    required: Sequence[str],
-) -> None:
-    """Raise where a required parameter is hopeless, or the twin of another one."""
-    covariance = _covariance([part[:, :, list(left)] for part in jac], residual, blocks)
-    items = [free[k] for k in left]
-    loose = _looseness(items, covariance)
-    for j, item in enumerate(items):
-        if item.path in required and (loose[j] > _HOPELESS or _twin(covariance, j) > _SAME):
-            why = _reason(items, covariance, j, loose[j])
+    for j, item in enumerate(spread.free):
+        if item.path in required and (spread.loose[j] > _HOPELESS or spread.blind[j]):
+            why = spread.reason(j)
             raise InputError(f"--free {item.path}: the logs cannot determine it: {why}")
+    return left, rank(table.only(left), dropped)
 
 
-def _twin(covariance: Floats, j: int) -> float:
-    """Largest correlation with any other parameter."""
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    if not np.isfinite(std).all() or not std.all():
-        return 1.0
-    correlation = np.abs(covariance[j] / (std[j] * std))
-    correlation[j] = 0.0
-    return float(correlation.max())
-
-
-def _looseness(free: Sequence[ParameterCandidate], covariance: Floats) -> Floats:
-    """Relative deviation; offsets and delays count in ten meaningful changes."""
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    unit = np.array([1.0 if item.log_scale else 10.0 * item.size for item in free])
-    return np.asarray(np.where(np.isfinite(std), std / unit, np.inf), dtype=np.float64)
-
-
-def _reason(free: Sequence[ParameterCandidate], covariance: Floats, j: int, loose: float) -> str:
-    text = f"its deviation would be {100.0 * loose:.0f} %" if np.isfinite(loose) else "no effect"
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    if not np.isfinite(std).all() or std[j] == 0.0:
-        return "it cannot be determined from the others"
-    correlation = covariance[j] / (std[j] * np.where(std > 0.0, std, 1.0))
-    correlation[j] = 0.0
-    other = int(np.argmax(np.abs(correlation)))
-    if abs(correlation[other]) > _CORRELATED:
-        text += f", and it cannot be determined from {free[other].path} ({correlation[other]:+.3f})"
-    return text
-
-
-def _covariance(
-    jac: Sequence[Floats],
-    residual: Sequence[Floats],
-    blocks: Sequence[npt.NDArray[np.int64]],
-) -> Floats:
-    size = jac[0].shape[2]
-    normal = np.zeros((size, size))
-    scores = []
-    for part, misfit in zip(jac, residual, strict=True):
-        flat = part.reshape(-1, size)
-        normal += flat.T @ flat
-        bounded = np.clip(misfit, -3.0, 3.0)
-        scores.append(np.einsum("ncp,nc->np", part, bounded))
-    return block_covariance(normal, scores, blocks)[0]
-
-
-def _pairs(
-    names: Sequence[str], covariance: Floats, std: Floats
-) -> tuple[tuple[str, str, float], ...]:
-    if not np.isfinite(std).all():
-        return ()
-    correlation = covariance / np.outer(np.where(std > 0, std, 1.0), np.where(std > 0, std, 1.0))
-    pairs = [
-        (names[i], names[j], float(correlation[i, j]))
-        for i in range(len(names))
-        for j in range(i)
-        if abs(correlation[i, j]) > _CORRELATED
-    ]
-    return tuple(sorted(pairs, key=lambda item: -abs(item[2])))
+def _unexcited(table: SensitivityTable, required: Sequence[str]) -> dict[str, str]:
+    """Candidates that move no signal."""
+    strength = np.linalg.norm(table.jacobian, axis=0)
+    weak = [
+        item for item, size in zip(table.free, strength, strict=True)
+        if not size > 1e-6 * np.sqrt(len(table.jacobian))
+    ]  # fmt: skip
+    for item in weak:
+        if item.path in required:
+            raise InputError(
+                f"--free {item.path}: nothing in the logs excites it (a change of "
+                f"{item.spread:g} moves no signal); leave it out or add a log that does"
+            )
+    return {item.path: "nothing in the logs excites it" for item in weak}

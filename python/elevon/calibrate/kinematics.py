@@ -10,19 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.blocks import block_covariance
 from elevon.calibrate.direct import saturated_speed
-from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError
+from elevon.estimate.covariance import block_covariance, joined, robust_covariance
+from elevon.estimate.residual import fit_residual
 from elevon.logs.command.fit import FREE, WaveformFit, best_waveform, fit_waveform
 from elevon.logs.command.known import NotedCommand, align_noted, noted_values
 from elevon.logs.command.reconstruct import reconstruct
-from elevon.logs.covariance import robust_covariance
+from elevon.logs.log import Log
 from elevon.waveforms import evaluate
 
 __all__ = ["KINEMATIC", "CommandFit", "command_fit", "speed_limit", "speed_sensor"]
@@ -72,7 +71,7 @@ class CommandFit:
     reach: float
     values: Floats = field(repr=False, compare=False)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return it as plain types."""
         return {
             "log": self.log,
@@ -89,14 +88,14 @@ class CommandFit:
         }
 
 
-def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
+def command_fit(log: Log, gain: float, limit: float) -> CommandFit | None:
     """Fit the command's waveform and the position gain of one log.
 
     A command noted in full counts as noted; only its instant is fitted.
 
     Parameters
     ----------
-    log : BenchLog
+    log : Log
         With the output's position.
     gain : float
         Position gain to start from [1/s].
@@ -108,7 +107,7 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     CommandFit or None
         None where the position is missing or no waveform explains the set point.
     """
-    if log.output is None:
+    if not log.has("output_position"):
         return None
     try:
         trace = reconstruct(log.time, log.speed_ref, log.output, gain=gain, limit=limit)
@@ -128,11 +127,8 @@ def command_fit(log: BenchLog, gain: float, limit: float) -> CommandFit | None:
     return _with_gain(log, fit, gain, limit)
 
 
-def _noted_with_gain(
-    log: BenchLog, noted: NotedCommand, gain: float, limit: float
-) -> CommandFit | None:
+def _noted_with_gain(log: Log, noted: NotedCommand, gain: float, limit: float) -> CommandFit | None:
     """Gain under a command noted in full: noted = set point / gain + position, its instant free."""
-    assert log.output is not None
     assert log.note is not None
     inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit) & (log.time >= noted.start)
     t, ref, output = log.time[inside], log.speed_ref[inside] / gain, log.output[inside]
@@ -164,14 +160,11 @@ def _noted_with_gain(
     )
 
 
-def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> CommandFit | None:
+def _with_gain(log: Log, fit: WaveformFit, gain: float, limit: float) -> CommandFit | None:
     """Waveform's parameters and the gain together: waveform = set point / gain + position."""
-    from scipy.optimize import least_squares
-
     names = [n for n in FREE[fit.kind] if math.isfinite(fit.values[n])]
     inside = log.good & (np.abs(log.speed_ref) < 0.999 * limit)
     inside &= (log.time >= fit.window[0]) & (log.time <= fit.window[1])
-    assert log.output is not None
     t, ref, output = log.time[inside], log.speed_ref[inside] / gain, log.output[inside]
     start = np.array([*(fit.values[n] for n in names), 1.0])
     scale = np.array([*(max(abs(fit.values[n]), 1e-3) for n in names), 1.0])
@@ -180,13 +173,13 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
         values = {**fit.values, **dict(zip(names, map(float, x[:-1]), strict=True))}
         return np.asarray(evaluate(fit.kind, values, t) - ref * x[-1] - output, dtype=np.float64)
 
-    best = least_squares(residual, start, x_scale=scale * 1e-2, jac="3-point", max_nfev=100)
-    if not best.success:
+    best = fit_residual(residual, start, scale=scale * 1e-2, jacobian="3-point", most=100)
+    if not best.converged:
         return None
-    misfit = np.asarray(best.fun)
-    if float(misfit.std()) > _SMALL * float(np.std(output)):
+    if float(best.residual.std()) > _SMALL * float(np.std(output)):
         return None
-    std = np.sqrt(np.maximum(np.diag(robust_covariance(np.asarray(best.jac), misfit)), 0.0))
+    covariance = robust_covariance(best.jacobian, best.residual)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     inverse, inverse_std = float(best.x[-1]), float(std[-1])
     if not inverse > 0.0:
         return None
@@ -207,15 +200,14 @@ def _with_gain(log: BenchLog, fit: WaveformFit, gain: float, limit: float) -> Co
     )
 
 
-def speed_sensor(logs: Sequence[BenchLog]) -> dict[str, tuple[float, float]] | None:
+def speed_sensor(logs: Sequence[Log]) -> dict[str, tuple[float, float]] | None:
     """Gain and offset of the logged speed against the motor's angle, with deviations.
 
     The integral of the speed is regressed on the angle and on time: angle = (int w - o t)/g + c.
     """
     rows, data, blocks = [], [], []
-    used = [log for log in logs if log.motor is not None and np.ptp(log.motor) > 0.0]
+    used = [log for log in logs if log.has("motor_position") and np.ptp(log.motor) > 0.0]
     for k, log in enumerate(used):
-        assert log.motor is not None
         turned = np.concatenate(
             ([0.0], np.cumsum(0.5 * (log.speed[1:] + log.speed[:-1]) * np.diff(log.time)))
         )
@@ -235,13 +227,12 @@ def speed_sensor(logs: Sequence[BenchLog]) -> dict[str, tuple[float, float]] | N
         return None
     beta = np.linalg.solve(normal, design.T @ target)
     misfit = target - design @ beta
-    parts = np.split(misfit[:, None] * design, np.cumsum([len(d) for d in data])[:-1])
-    covariance, _ = block_covariance(normal, parts, blocks)
+    covariance, _ = block_covariance(normal, misfit[:, None] * design, joined(blocks))
     std = np.sqrt(np.diag(covariance))
     return {"gain": (float(beta[0]), float(std[0])), "offset": (float(beta[1]), float(std[1]))}
 
 
-def speed_limit(logs: Sequence[BenchLog]) -> float | None:
+def speed_limit(logs: Sequence[Log]) -> float | None:
     """Level at which the set point is held flat, where any log shows one [rad/s]."""
     tops = [top for log in logs if math.isfinite(top := saturated_speed(log))]
     return max(tops) if tops else None

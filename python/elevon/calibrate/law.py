@@ -13,16 +13,17 @@ motion's slope, which is smooth.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.calibrate.direct import saturated_speed
-from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, lagged, smoothed
-from elevon.calibrate.regression import Regression, robust_regression, with_deviations
+from elevon.estimate.covariance import Strokes
+from elevon.estimate.regression import Regression, huber, regressed
+from elevon.logs.log import Log
 
 __all__ = ["controller_law"]
 
@@ -43,19 +44,19 @@ class _Law:
     inside: Sequence[Bools]
     periods: Sequence[float]
 
-    def set_point(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Solve on the set point of the current."""
-        return self._solve(self.columns, self.targets)
+    def rows(self) -> tuple[list[Floats], list[Floats]]:
+        """Columns and set point of the current, of the samples that count."""
+        return self._used(self.columns), self._used(self.targets)
 
     def without(self, column: int) -> Floats:
         """Solve without one column; its coefficient comes back as zero."""
         residual = [np.delete(c, column, axis=1) for c in self.columns]
-        return np.insert(self._solve(residual, self.targets)[0], column, 0.0)
+        return np.insert(self._solve(residual), column, 0.0)
 
     def joint(self) -> Floats:
         """Solve with one derivative gain for both slopes; coefficients in the common order."""
         joined = [np.column_stack((c[:, :2], c[:, 2] + c[:, 3], c[:, 4:])) for c in self.columns]
-        beta = self._solve(joined, self.targets)[0]
+        beta = self._solve(joined)
         return np.insert(beta, 2, beta[2])
 
     def late(self) -> Floats:
@@ -64,27 +65,22 @@ class _Law:
             np.column_stack((c, *(np.gradient(c[:, k], dt) for k in (2, 3))))
             for c, dt in zip(self.columns, self.periods, strict=True)
         ]
-        return self._solve(more, self.targets)[0][:-2]
+        return self._solve(more)[:-2]
 
-    def _solve(
-        self, columns: Sequence[Floats], targets: Sequence[Floats]
-    ) -> tuple[Floats, Floats, Floats, Floats]:
-        rows = [c[good] for c, good in zip(columns, self.inside, strict=True)]
-        data = [t[good] for t, good in zip(targets, self.inside, strict=True)]
-        return robust_regression(np.vstack(rows), np.concatenate(data))
+    def _used(self, arrays: Sequence[Floats]) -> list[Floats]:
+        return [c[good] for c, good in zip(arrays, self.inside, strict=True)]
+
+    def _solve(self, columns: Sequence[Floats]) -> Floats:
+        return huber(np.vstack(self._used(columns)), np.concatenate(self._used(self.targets)))[0]
 
 
-def controller_law(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float = 0.0
-) -> Regression | None:
+def controller_law(logs: Sequence[Log], lag: float = 0.0) -> Regression | None:
     """Regress the current's set point on the speed error, its integral and its derivative.
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         All of them count: the law holds whatever the load.
-    keeps : sequence of ndarray of bool
-        Samples that may be used, one a log.
     lag : float
         Of the measured current behind the torque [s]: where no set point was logged, the measured
         current stands for it.
@@ -102,36 +98,30 @@ def controller_law(
     integral one weight for set point and motion in the place of two, for the derivative one gain
     in the place of two, and slopes that come late as a filter or a slow tick would have them.
     """
-    law, present, times = _ready(logs, keeps, lag)
-    design = np.vstack([c[good] for c, good in zip(law.columns, law.inside, strict=True)])
+    law, present, strokes = _ready(logs, lag)
+    rows, data = law.rows()
+    design = np.vstack(rows)
     size = np.linalg.norm(design, axis=0)
     if len(design) < _LEAST or not np.all(size > 0.0):
         return None
     if np.linalg.matrix_rank(design / size) < design.shape[1]:
         return None
     names = (*_TERMS, *(f"start[{k}]" for k in present))
-    beta, residual, weight, design = law.set_point()
-    regression = with_deviations(names, beta, design, residual, weight, times=times)
-    if not np.isfinite(regression.covariance).all():
-        return regression
-    sloped = np.isin(names, ("derivative", "slope"))
-    covariance = regression.covariance
-    for other in (
-        np.where(sloped, beta, law.without(_TERMS.index("motion"))),
-        np.where(sloped, law.joint(), beta),
-        np.where(sloped, law.late(), beta),
-        *((_slower(beta),) if any(_stands_for(log) for log in logs) else ()),
-    ):
-        gap = other - beta
-        covariance = covariance + np.outer(gap, gap)
-    return replace(regression, covariance=covariance)
+    regression = regressed(names, rows, data, strokes)
+    sloped, beta = np.isin(names, ("derivative", "slope")), regression.value
+    return regression.open_to(
+        (
+            np.where(sloped, beta, law.without(_TERMS.index("motion"))),
+            np.where(sloped, law.joint(), beta),
+            np.where(sloped, law.late(), beta),
+            *((_slower(beta),) if any(_stands_for(log) for log in logs) else ()),
+        )
+    )
 
 
-def _ready(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], lag: float
-) -> tuple[_Law, list[int], list[tuple[Floats, Floats, float]]]:
+def _ready(logs: Sequence[Log], lag: float) -> tuple[_Law, list[int], list[Strokes]]:
     """Columns of every log, which logs have any sample, and the times of the samples used."""
-    inside = [_inside(log, keep) for log, keep in zip(logs, keeps, strict=True)]
+    inside = [_inside(log) for log in logs]
     present = [k for k, good in enumerate(inside) if good.any()]
     columns, targets = [], []
     for k, log in enumerate(logs):
@@ -140,16 +130,16 @@ def _ready(
         table = np.column_stack((*_columns(log, sigma), *starts))
         columns.append(lagged(table, lag, log.period) if _stands_for(log) else table)
         targets.append(smoothed(log.current_target, sigma))
-    times = [
+    strokes = [
         (log.time[good], log.speed[good], log.period)
         for log, good in zip(logs, inside, strict=True)
     ]
-    return _Law(columns, targets, inside, [log.period for log in logs]), present, times
+    return _Law(columns, targets, inside, [log.period for log in logs]), present, strokes
 
 
-def _stands_for(log: BenchLog) -> bool:
+def _stands_for(log: Log) -> bool:
     """Whether the measured current stands for a set point that was not logged."""
-    return log.current_target is log.current and log.current_signal == "current_q_meas"
+    return not log.has("current_ref")
 
 
 def _slower(beta: Floats) -> Floats:
@@ -160,23 +150,25 @@ def _slower(beta: Floats) -> Floats:
     return other
 
 
-def _sigma(log: BenchLog) -> float:
+def _sigma(log: Log) -> float:
     return max(kernel(log), _NARROWEST)
 
 
-def _inside(log: BenchLog, keep: Bools) -> Bools:
+def _inside(log: Log) -> Bools:
     """Samples away from a saturated set point and from the log's ends."""
     saturated = np.abs(log.speed_ref) >= 0.999 * saturated_speed(log)
-    good = keep & log.good & ~dilated(saturated, log.period, _SETTLED)
+    good = log.good & ~dilated(saturated, log.period, _SETTLED)
     margin = round(4.0 * _sigma(log))
     good[:margin] = good[-margin:] = False
     return np.asarray(good, dtype=np.bool_)
 
 
-def _columns(log: BenchLog, sigma: float) -> list[Floats]:
+def _columns(log: Log, sigma: float) -> list[Floats]:
     """Error, its integral, the motion's slope (negative), the set point's, the motion."""
     speed, acceleration = acceleration_of(log, sigma)
-    turned = integral(log.time, log.speed) if log.motor is None else log.motor - log.motor[0]
+    turned = (
+        integral(log.time, log.speed) if not log.has("motor_position") else log.motor - log.motor[0]
+    )
     return [
         smoothed(log.speed_ref, sigma) - speed,
         smoothed(integral(log.time, log.speed_ref) - turned, sigma),

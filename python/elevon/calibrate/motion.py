@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.log import BenchLog
+from elevon.logs.log import Log
 
 __all__ = [
     "SmoothedMotion",
@@ -44,25 +44,25 @@ class SmoothedMotion:
     sigma: float
 
 
-def motion_of(log: BenchLog) -> SmoothedMotion:
+def motion_of(log: Log) -> SmoothedMotion:
     """Speed, acceleration and current through one kernel and its derivatives."""
     sigma = kernel(log)
     return SmoothedMotion(*acceleration_of(log, sigma), smoothed(log.current, sigma), sigma)
 
 
-def acceleration_of(log: BenchLog, sigma: float) -> tuple[Floats, Floats]:
+def acceleration_of(log: Log, sigma: float) -> tuple[Floats, Floats]:
     """Smoothed speed and acceleration.
 
     Derivatives are those of the kernel: differences of neighbours would damp what is fast, at
     40 Hz already by 6 %, and the lag and the derivative time would take it up.
     """
     dt = log.period
-    if log.motor is None:
+    if not log.has("motor_position"):
         return smoothed(log.speed, sigma), smoothed(log.speed, sigma, 1) / dt
     return smoothed(log.motor, sigma, 1) / dt, smoothed(log.motor, sigma, 2) / dt**2
 
 
-def kernel(log: BenchLog) -> float:
+def kernel(log: Log) -> float:
     """Deviation in samples of a Gaussian that brings the acceleration's noise under its limit."""
     for sigma in _SIGMAS:
         acceleration = acceleration_of(log, sigma)[1]

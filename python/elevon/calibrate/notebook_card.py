@@ -10,7 +10,7 @@ from elevon.report.cards import Html, badge, card, table
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.estimate import Estimate
+    from elevon.estimate import Estimate
 
 __all__ = ["calibration_card"]
 

@@ -21,10 +21,11 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.blocks import block_covariance
-from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import acceleration_of, delayed, kernel, lagged, motion_of, smoothed
-from elevon.calibrate.regression import Regression
+from elevon.estimate.covariance import block_covariance
+from elevon.estimate.regression import Regression
+from elevon.estimate.residual import fit_residual, robust_weights
+from elevon.logs.log import Log
 
 __all__ = ["Presliding", "presliding_friction", "reversals", "usable_logs"]
 
@@ -69,7 +70,7 @@ class _Windows:
 
 
 def presliding_friction(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, constant: float
+    logs: Sequence[Log], plant: Regression, constant: float
 ) -> Presliding | None:
     """Fit the bristles to all reversals of the logs.
 
@@ -79,7 +80,7 @@ def presliding_friction(
 
     Parameters
     ----------
-    logs, keeps
+    logs
         As `elevon.calibrate.breakaway.static_friction`.
     plant : Regression
         The torque balance.
@@ -91,7 +92,7 @@ def presliding_friction(
     Presliding or None
         None with fewer than four reversals.
     """
-    windows = _windows(logs, keeps, plant, constant)
+    windows = _windows(logs, plant, constant)
     if windows is None:
         return None
     dry = constant * plant["dry"]
@@ -112,18 +113,16 @@ def presliding_friction(
     return Presliding(best.static + beyond, std, degrees, float(np.exp(best.x[0])))
 
 
-def usable_logs(logs: Sequence[BenchLog], keeps: Sequence[Bools]) -> list[tuple[BenchLog, Bools]]:
+def usable_logs(logs: Sequence[Log]) -> list[Log]:
     """Return logs whose angle and brake are known; only those without brake where they suffice."""
     known = [
-        (log, keep & log.good)
-        for log, keep in zip(logs, keeps, strict=True)
-        if log.motor is not None and log.brake.known in {"off", "torque"}
+        log for log in logs if log.has("motor_position") and log.brake.known in {"off", "torque"}
     ]
-    free = [item for item in known if item[0].brake.known == "off"]
-    return free if sum(len(reversals(*item)) for item in free) >= _FEWEST else known
+    free = [log for log in known if log.brake.known == "off"]
+    return free if sum(len(reversals(log)) for log in free) >= _FEWEST else known
 
 
-def reversals(log: BenchLog, keep: Bools) -> list[tuple[int, int]]:
+def reversals(log: Log) -> list[tuple[int, int]]:
     """Last sample of sliding before, and first of sliding after, every reversal."""
     speed = motion_of(log).speed
     at = np.flatnonzero(np.abs(speed) > _CLEAR * float(np.abs(speed).max()))
@@ -135,27 +134,25 @@ def reversals(log: BenchLog, keep: Bools) -> list[tuple[int, int]]:
         and after - before < longest
         and around <= before
         and after < len(speed) - around
-        and keep[before - around : after + around].all()
+        and log.good[before - around : after + around].all()
     ]
 
 
-def _windows(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, constant: float
-) -> _Windows | None:
+def _windows(logs: Sequence[Log], plant: Regression, constant: float) -> _Windows | None:
     """Cut the reversals of all logs into rows of one length."""
-    used = usable_logs(logs, keeps)
-    turns = [reversals(log, keep) for log, keep in used]
+    used = usable_logs(logs)
+    turns = [reversals(log) for log in used]
     many = -(-sum(map(len, turns)) // _MOST)
     turns = [turn[::many] for turn in turns]
     spans = [after - before for turn in turns for before, after in turn]
     if len(spans) < _FEWEST:
         return None
-    period = used[0][0].period
+    period = used[0].period
     around = round((_AFTER + _MARGIN) / period)
     length = max(spans) + 2 * around
-    sigma = max(kernel(log) for log, _ in used)
+    sigma = max(kernel(log) for log in used)
     balance = _Known(plant, constant, sigma, length)
-    rows = [balance.rows(log, turn) for (log, _), turn in zip(used, turns, strict=True) if turn]
+    rows = [balance.rows(log, turn) for log, turn in zip(used, turns, strict=True) if turn]
     steps, torque, brake, direction, counts = (
         np.concatenate([row[k] for row in rows]) for k in range(5)
     )
@@ -171,7 +168,7 @@ class _Known:
     sigma: float
     length: int
 
-    def friction(self, log: BenchLog) -> tuple[Floats, Floats]:
+    def friction(self, log: Log) -> tuple[Floats, Floats]:
         """Torque [N m] that inertia and viscosity leave to the friction, and the speed [rad/s]."""
         plant = self.plant
         speed, acceleration = acceleration_of(log, self.sigma)
@@ -181,12 +178,11 @@ class _Known:
         return self.constant * (smoothed(log.current, self.sigma) - shift - late), speed
 
     def rows(
-        self, log: BenchLog, turns: list[tuple[int, int]]
+        self, log: Log, turns: list[tuple[int, int]]
     ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Windows of one log; a short reversal has more of the motion before it, uncounted."""
         from scipy.interpolate import CubicSpline
 
-        assert log.motor is not None
         torque, speed = self.friction(log)
         last = len(torque) - 1
         brake = np.zeros_like(torque)
@@ -215,8 +211,8 @@ class _Fit:
     x: Floats
     exponent: float
     cost: float
-    misfit: Floats  # (n, m), zero where nothing counts
-    jac: Floats  # (n, m, 6)
+    misfit: Floats  # (k,), of the samples that count
+    jac: Floats  # (k, 6)
 
     @property
     def static(self) -> float:
@@ -224,24 +220,21 @@ class _Fit:
 
     def variance(self, windows: _Windows) -> tuple[float, float]:
         """Variance of the static friction from the reversals' scores, and degrees of freedom."""
-        jac, misfit = self.jac[windows.counts], self.misfit[windows.counts]
         # A small excess does not show at which speed it is gone.
         active = [k for k in range(6) if k != 2 or self.x[1] > _SMALL * self.x[4]]
-        jac = jac[:, active]
-        spread = 1.4826 * float(np.median(np.abs(misfit))) or 1e-300
-        weight = 1.0 / np.sqrt(1.0 + (misfit / (_SCALE * spread)) ** 2)
-        events = np.nonzero(windows.counts)[0]
+        spread = 1.4826 * float(np.median(np.abs(self.misfit))) or 1e-300
+        weight, curvature = robust_weights(self.misfit, "soft_l1", _SCALE * spread)
+        jac = self.jac[:, active]
         covariance, degrees = block_covariance(
-            (jac * weight[:, None] ** 3).T @ jac, [jac * (weight * misfit)[:, None]], [events]
-        )
+            (jac * curvature[:, None]).T @ jac, jac * (weight * self.misfit)[:, None],
+            np.nonzero(windows.counts)[0],
+        )  # fmt: skip
         gradient = np.isin(active, (1, 4)).astype(np.float64)
         return float(gradient @ covariance @ gradient), degrees
 
 
 def _fit(windows: _Windows, dry: float, exponent: float, start: Floats | None = None) -> _Fit:
     """Least robust squares from the best point of a grid, or from a start."""
-    from scipy.optimize import least_squares
-
     if start is None:
         start = _coarse(windows, dry, exponent)
     low = np.array([np.log(10.0 * dry), 0.0, np.log(_SLOWEST), 0.0, 0.5 * dry, -0.2 * dry])
@@ -251,24 +244,14 @@ def _fit(windows: _Windows, dry: float, exponent: float, start: Floats | None = 
         misfit: Floats = _residual(windows, x[None], exponent)[0][windows.counts]
         return misfit
 
-    def jacobian(x: Floats) -> Floats:
-        return _slopes(windows, x, exponent, dry)
-
-    scale = 1.4826 * float(np.median(np.abs(residual(start))))
-    best = least_squares(
-        residual,
-        np.clip(start, low + 1e-9, high - 1e-9),
-        jac=jacobian,
-        bounds=(low, high),
-        x_scale=np.array([0.5, 0.1 * dry, 0.5, 0.5, 0.1 * dry, 0.1 * dry]),
-        loss="soft_l1",
-        f_scale=_SCALE * max(scale, 1e-6),
-        max_nfev=40,
-    )
-    misfit = np.zeros(windows.counts.shape)
-    jac = np.zeros((*misfit.shape, 6))
-    misfit[windows.counts], jac[windows.counts] = residual(best.x), jacobian(best.x)
-    return _Fit(best.x, exponent, float(np.sum(np.abs(misfit))), misfit, jac)
+    spread = 1.4826 * float(np.median(np.abs(residual(start))))
+    fit = fit_residual(
+        residual, np.clip(start, low + 1e-9, high - 1e-9), ends=(low, high), loss="soft_l1",
+        jacobian=lambda x: _slopes(windows, x, exponent, dry), soft=_SCALE * max(spread, 1e-6),
+        scale=np.array([0.5, 0.1 * dry, 0.5, 0.5, 0.1 * dry, 0.1 * dry]), most=40,
+    )  # fmt: skip
+    cost = float(np.sum(np.abs(fit.residual)))
+    return _Fit(fit.x, exponent, cost, fit.residual, fit.jacobian)
 
 
 def _coarse(windows: _Windows, dry: float, exponent: float) -> Floats:

@@ -6,26 +6,118 @@ model has is compared, role by role.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
+from elevon.calibrate.validation import Validation, ValidationTrace
 from elevon.errors import InputError, SimulationError, unknown
+from elevon.experiment import Experiment, Inputs, ModelRun
+from elevon.logs.log import Log, on_clock
+from elevon.progress import part
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
     from elevon.recording import Recording
-    from elevon.recording.channel import Channel
-    from elevon.scenario import Scenario
 
-__all__ = ["as_recorded", "replay_scenario", "validate_replay"]
+__all__ = ["as_recorded", "replayed", "unit_experiment", "validate_replay"]
 
 _INPUTS = ("command", "load")
 _SMOOTH = 0.5  # s over which the ram's imposed speed is taken from its position
+_SHORTEST = 64  # samples that a filter of the recorder needs
+
+
+def unit_experiment(
+    log: Log, actuator: Actuator, fidelity: str, *, period: float | None = None
+) -> Experiment:
+    """Return the test of a log as it was commanded, the actuator as the log's stand had it.
+
+    Raises
+    ------
+    InputError
+        A role that is needed is missing, or the model shows nothing of the log.
+    """
+    position, stand = log["output_position"], log.stand
+    loads = {}
+    if stand.moves_output:
+        loads["rig_speed"] = (log.time, _speed(log.time, position))
+    elif log.has("load"):
+        loads["output"] = (log.time, log["load"])
+    inputs = Inputs(
+        log.duration, "gear", actions=_actions(log, actuator.wiring), loads=loads,
+        initial=dict(stand.initial) or {"nut_position": float(position[0])},
+    )  # fmt: skip
+    ready = actuator.with_values(dict(stand.parameters), source="stand of the log", place=log.name)
+    shows = {
+        role: signal
+        for role, signal in _signals(actuator.wiring, fidelity).items()
+        if log.has(role) and role not in _INPUTS and (stand.moves_output or role != "load_cell")
+    }
+    if not shows:
+        raise InputError(f"{log.name}: shows nothing that the model has; roles: {', '.join(log)}")
+    return Experiment(log, ready, inputs, shows, period=period, fidelity=fidelity, notices=True)
+
+
+def _signals(wiring: str, fidelity: str) -> dict[str, str]:
+    """Role to the model's signal, the last of a role."""
+    from elevon.scenario.compile import signal_records
+
+    return {item["role"]: name for name, item in signal_records(wiring, fidelity).items()}
+
+
+def _actions(log: Log, wiring: str) -> tuple[tuple[float, str], ...]:
+    """Return the actions commanded: a held number, one round higher when it is repeated."""
+    from elevon.parameters.records import wirings
+
+    names: list[str] = wirings()[wiring]["actions"]
+    command = log if log.recording is None else log.on("command")
+    values = np.rint(command["command"])
+    changes = np.flatnonzero(np.diff(values)) + 1
+    start = command.start - log.start
+    return tuple(
+        (float(command.time[k] + start), names[int(values[k]) % len(names)]) for k in changes
+    )
+
+
+def _speed(time: Floats, position: Floats) -> Floats:
+    """Speed of a ram that is moved: the slope of its position over half a second."""
+    from scipy.signal import savgol_filter
+
+    period = float(np.median(np.diff(time)))
+    width = max(5, 2 * round(0.5 * _SMOOTH / period) + 1)
+    slope = savgol_filter(position, min(width, len(position) - 1 | 1), 1, deriv=1, delta=period)
+    return np.asarray(slope, dtype=np.float64)
+
+
+def replayed(experiment: Experiment, progress: Progress | None = None) -> ModelRun:
+    """Run a log's test once.
+
+    Raises
+    ------
+    SimulationError
+        It left the finite numbers.
+    """
+    run = next(experiment.run(progress=progress))
+    if run.status == "diverged":
+        raise SimulationError(f"{experiment.log.name}: the run diverges", run.status)
+    return run
+
+
+def as_recorded(log: Log, run: ModelRun, role: str, *, stepped: bool = False) -> Floats:
+    """Return a run's channel on the log's instants, through the filter of its recorder, if any.
+
+    States, and what else is `stepped`, are as they were written last.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    values, unit = run.log[role], "1" if stepped else log.units.get(role, "")
+    rate = 1.0 / run.log.period
+    if unit != "1" and 0.0 < log.stand.cutoff < 0.5 * rate and len(values) >= _SHORTEST:
+        values = sosfiltfilt(butter(4, log.stand.cutoff, fs=rate, output="sos"), values)
+    return on_clock(run.log.time, values, log.time, unit)
 
 
 def validate_replay(
@@ -58,170 +150,33 @@ def validate_replay(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.progress import part
-
     promised = actuator.validation or {}
     limits, offsets = dict(promised.get("limits", {})), dict(promised.get("offsets", {}))
     given = float(promised.get("transient", 0.0)) if transient is None else transient
     traces, errors = [], []
     for number, (name, recording) in enumerate(logs):
         share = part(progress, number / len(logs), (number + 1) / len(logs))
-        trace, units = _trace(name, recording, actuator, fidelity, given, progress=share)
+        log = Log.of(recording, name, clock="output_position")
+        trace = _trace(log, actuator, fidelity, given, share)
         for signal in limits:
-            if signal not in units:
-                raise unknown("signal", signal, units, f"{actuator.name}: validation.limits")
+            if signal not in trace.measured:
+                raise unknown(
+                    "signal", signal, trace.measured, f"{actuator.name}: validation.limits"
+                )
         traces.append(trace)
-        errors += [_error(trace, role, units[role], offsets, limits) for role in trace.simulated]
+        errors += trace.errors(log.units, limits, offsets)
     how = {name: "as logged" for name, _ in logs}
     return Validation(actuator.name, fidelity, given, tuple(errors), how, tuple(traces), offsets)
 
 
-def replay_scenario(
-    recording: Recording, actuator: Actuator, name: str
-) -> tuple[Actuator, Scenario]:
-    """Return the actuator as the log's stand had it, and the scenario of the log's inputs.
-
-    Raises
-    ------
-    InputError
-        A role that is needed is missing.
-    """
-    from elevon.scenario import Scenario
-
-    roles = recording.roles
-    for role in ("command", "output_position"):
-        if role not in roles:
-            raise InputError(f"{name}: no channel has the role {role!r}; roles: {', '.join(roles)}")
-    stand = _stand(recording)
-    position = recording.role("output_position")
-    time = np.asarray(position.time - position.time[0], dtype=np.float64)
-    load: dict[str, Any] = {}
-    if stand.get("rig_moves"):
-        load["rig_speed"] = _table(time, _speed(time, np.asarray(position.values)))
-    elif "load" in roles:
-        channel = recording.role("load")
-        load["output"] = _table(channel.time - position.time[0], channel.values)
-    initial = dict(stand.get("initial", {})) or {"nut_position": float(position.values[0])}
-    scenario = Scenario.from_dict(
-        {
-            "duration": float(time[-1]),
-            "command": {"mode": "gear", "steps": _actions(recording, actuator.wiring)},
-            "load": load,
-            "initial": initial,
-        },
-        name,
-    )
-    values = dict(stand.get("parameters", {}))
-    return actuator.with_values(values, source="stand of the log", place=name), scenario
-
-
-def _stand(recording: Recording) -> Mapping[str, Any]:
-    stand = recording.meta.get("stand")
-    return stand if isinstance(stand, Mapping) else {}
-
-
-def _actions(recording: Recording, wiring: str) -> list[dict[str, Any]]:
-    """Return the actions commanded: a held number, one round higher when it is repeated."""
-    from elevon.parameters.records import wirings
-
-    actions: list[str] = wirings()[wiring]["actions"]
-    channel = recording.role("command")
-    values = np.rint(np.asarray(channel.values))
-    changes = np.flatnonzero(np.diff(values)) + 1
-    start = float(channel.time[0])
-    return [
-        {"time": float(channel.time[k]) - start, "action": actions[int(values[k]) % len(actions)]}
-        for k in changes
-    ]
-
-
-def _table(time: Any, values: Any) -> dict[str, Any]:
-    times, points = np.asarray(time).tolist(), np.asarray(values).tolist()
-    return {"terms": [{"kind": "table", "times": times, "values": points}]}
-
-
-def _speed(time: Floats, position: Floats) -> Floats:
-    """Speed of a ram that is moved: the slope of its position over half a second."""
-    from scipy.signal import savgol_filter
-
-    period = float(np.median(np.diff(time)))
-    width = max(5, 2 * round(0.5 * _SMOOTH / period) + 1)
-    slope = savgol_filter(position, min(width, len(position) - 1 | 1), 1, deriv=1, delta=period)
-    return np.asarray(slope, dtype=np.float64)
-
-
 def _trace(
-    name: str,
-    recording: Recording,
-    actuator: Actuator,
-    fidelity: str,
-    transient: float,
-    *,
-    progress: Progress | None,
-) -> tuple[ValidationTrace, dict[str, str]]:
-    from elevon.scenario.compile import signal_records
-    from elevon.simulate import simulate
-
-    ready, scenario = replay_scenario(recording, actuator, name)
-    if not transient < scenario.seconds:
-        raise InputError(f"transient of {transient:g} s: {name} lasts {scenario.seconds:g} s")
-    names = {item["role"]: key for key, item in signal_records(actuator.wiring, fidelity).items()}
-    roles = [
-        role
-        for role in recording.roles
-        if role in names and role not in _INPUTS and recording.role(role).unit != "1"
-    ]
-    moved = bool(scenario.loads.rig_speed.terms)
-    roles = [role for role in roles if moved or role != "load_cell"]
-    if not roles:
-        raise InputError(f"{name}: shows nothing that the model has; roles: {recording.roles}")
-    signals = ",".join(dict.fromkeys(names[role] for role in roles))
-    run = simulate(ready, scenario, fidelity=fidelity, record=f"{signals}@every", progress=progress)
-    if run.status == "diverged":
-        raise SimulationError(f"{name}: {run.meta['message']}", run.status)
-    base = recording.role("output_position")
-    time = np.asarray(base.time - base.time[0], dtype=np.float64)
-    measured, simulated = {}, {}
-    for role in roles:
-        channel, model = recording.role(role), run[names[role]]
-        measured[role] = np.interp(base.time, channel.time, channel.values)
-        simulated[role] = np.interp(time, model.time, as_recorded(recording, model))
-    units = {role: recording.role(role).unit for role in roles}
-    used = (time >= transient) & (time <= float(run.meta["sim_s"]))
-    return ValidationTrace(name, time, measured, simulated, used), units
-
-
-def as_recorded(recording: Recording, model: Channel) -> Floats:
-    """Return the model's channel through the filter that the log's recorder states, if any."""
-    from scipy.signal import butter, sosfiltfilt
-
-    values = np.asarray(model.values, dtype=np.float64)
-    acquisition = recording.meta.get("acquisition")
-    cutoff = float(acquisition.get("cutoff_hz", 0.0)) if isinstance(acquisition, Mapping) else 0.0
-    rate = float(1.0 / np.median(np.diff(model.time)))
-    if not 0.0 < cutoff < 0.5 * rate or len(values) < 64:
-        return values
-    sections = butter(4, cutoff, fs=rate, output="sos")
-    return np.asarray(sosfiltfilt(sections, values), dtype=np.float64)
-
-
-def _error(
-    trace: ValidationTrace,
-    role: str,
-    unit: str,
-    offsets: Mapping[str, float],
-    limits: Mapping[str, float],
-) -> SignalError:
-    mask = trace.used & np.isfinite(trace.measured[role])
-    data = trace.measured[role][mask] - offsets.get(role, 0.0)
-    error = trace.simulated[role][mask] - data
-    rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
-    spread, reach = float(np.std(data)), float(np.ptp(data))
-
-    def percent(value: float, size: float) -> float:
-        return 100.0 * value / size if size > 0.0 else float("nan")
-
-    return SignalError(
-        trace.log, role, unit, rms, largest, percent(rms, spread), percent(rms, reach),
-        percent(largest, reach), limits.get(role),
-    )  # fmt: skip
+    log: Log, actuator: Actuator, fidelity: str, transient: float, progress: Progress | None
+) -> ValidationTrace:
+    if not transient < log.duration:
+        raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
+    experiment = unit_experiment(log, actuator, fidelity)
+    run = replayed(experiment, progress)
+    roles = [role for role in experiment.shows if log.units.get(role) != "1"]
+    simulated = {role: as_recorded(log, run, role) for role in roles}
+    used = (log.time >= transient) & (log.time <= run.seconds)
+    return ValidationTrace(log.name, log.time, {role: log[role] for role in roles}, simulated, used)

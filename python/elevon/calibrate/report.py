@@ -3,98 +3,96 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.calibrate.estimate import LEVEL
 from elevon.calibrate.forest import forest
-from elevon.calibrate.validation import SIGNALS
+from elevon.estimate import LEVEL
 from elevon.report import Check, Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.figure import Figure
 
-    from elevon.calibrate.calibration import Calibration
+    from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import Validation, ValidationTrace
 
 __all__ = ["calibration_report", "validation_report"]
 
-_AXES = {
-    "encoder_position": (180.0 / math.pi, "deg"),
-    "motor_speed": (30.0 / math.pi, "rpm"),
-    "current_q_meas": (1.0, "A"),
+#: How a quantity is shown, by its SI unit.
+_DISPLAY = {
+    "rad": (180.0 / math.pi, "deg"),
+    "rad/s": (30.0 / math.pi, "rpm"),
+    "m": (1e3, "mm"),
+    "m/s": (1e3, "mm/s"),
 }
-_LABELS = {
-    "encoder_position": "encoder",
-    "motor_speed": "motor speed",
-    "current_q_meas": "torque current",
-}
+_LABELS = {"encoder_position": "encoder", "current_q_meas": "torque current"}
 
 
 def calibration_report(
-    result: Calibration,
-    before: Validation | None = None,
-    after: Validation | None = None,
-    *,
-    truth: Mapping[str, float] | None = None,
-    provenance: Mapping[str, object] | None = None,
-    date: str | None = None,
+    result: Calibration, *, truth: Mapping[str, float] | None = None, date: str | None = None
 ) -> Report:
-    """Return the report of a calibration.
+    """Return the page of a calibration: parameters, what was not determined, errors of the logs.
 
     Parameters
     ----------
     result : Calibration
-        What was found.
-    before, after : Validation, optional
-        The closed loop against the same logs with old and new values.
+        The answer.
     truth : mapping, optional
         True values by path, where they are known.
-    provenance : mapping, optional
-        Version, command line.
     date : str, optional
         Printed on the page.
     """
+    facts = result.facts
     names = ", ".join(log.name for log in result.logs)
-    report = Report(
-        f"Calibration of {result.before.name}",
-        f"From {names}. "
-        + (
-            "The load cell gives the torque constant: torques are absolute."
-            if result.torque.measured
-            else "No load cell: torques are known only as ratios to the torque constant."
-        ),
-        date=date,
-    )
+    report = Report(f"Calibration of {result.name}", f"From {names}. {_scale(facts)}", date=date)
     report.fact("Parameters estimated", str(sum(i.in_set for i in result.estimates)))
-    if result.plant is not None:
-        report.fact("Torque balance", f"{100 * result.plant.explained:.2f} %", "of the current")
-    if result.law is not None:
-        report.fact("Speed controller", f"{100 * result.law.explained:.2f} %", "of the set point")
+    explained = facts.get("explained", {})
+    for name, text, of in (
+        ("torque_balance", "Torque balance", "of the current"),
+        ("speed_controller", "Speed controller", "of the set point"),
+    ):
+        if explained.get(name) is not None:
+            report.fact(text, f"{100 * explained[name]:.2f} %", of)
+    if "structure" in facts:
+        report.fact("Controller", f"{facts['structure']['chosen']} ({facts['structure']['why']})")
     report.fact("Time", f"{result.wall_s:.1f} s")
     _parameters(report, result, truth or {})
+    if result.undetermined:
+        rows = list(result.undetermined.items())
+        report.section("Not determined").table(ReportTable(["Parameter", "Reason"], rows))
     if result.findings:
         report.section("What to know").points(result.findings)
-    _ranking(report, result)
-    _held_out(report, result)
-    if after is not None:
-        _agreement(report, before, after)
-    if provenance:
-        report.provenance(provenance)
+    _ranking(report, facts.get("identifiability"))
+    _held_out(report, [item for item in facts.get("held_out", ()) if "speed_rms" in item])
+    if result.validation is not None:
+        _agreement(report, result.validation_before, result.validation)
+    report.provenance(_provenance())
     return report
 
 
-def validation_report(
-    result: Validation,
-    *,
-    provenance: Mapping[str, object] | None = None,
-    date: str | None = None,
-) -> Report:
-    """Return the report of a validation."""
+def _scale(facts: Mapping[str, Any]) -> str:
+    """Return what the scale of all torques comes from, where that was a question."""
+    if "torque_constant" not in facts:
+        return ""
+    if facts["torque_constant"]["from_load_cell"]:
+        return "The load cell gives the torque constant: torques are absolute."
+    return "No load cell: torques are known only as ratios to the torque constant."
+
+
+def _provenance() -> dict[str, object]:
+    import elevon
+
+    python = ".".join(str(part) for part in sys.version_info[:3])
+    return {"Elevon": elevon.__version__, "Python": python}
+
+
+def validation_report(result: Validation, *, date: str | None = None) -> Report:
+    """Return the page of a validation."""
     report = Report(
         f"{result.actuator} against its logs",
         f"Closed loop of the {result.fidelity} model on each log's own command, "
@@ -103,14 +101,13 @@ def validation_report(
     )
     _agreement(report, None, result)
     checks = [
-        Check(f"{e.log}: {_LABELS[e.signal]}, RMS error over range", e.of_range, e.limit, "%")
+        Check(f"{e.log}: {_label(e.signal)}, RMS error over range", e.of_range, e.limit, "%")
         for e in result.errors
         if e.limit is not None
     ]
     if checks:
         report.section("Thresholds of the actuator file").checks(checks)
-    if provenance:
-        report.provenance(provenance)
+    report.provenance(_provenance())
     return report
 
 
@@ -132,7 +129,7 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
             f"{item.interval[0]:.5g} to {item.interval[1]:.5g}",
             item.unit,
             item.register,
-            item.method,
+            item.source,
             ", ".join(item.given),
         ]
         if truth:
@@ -144,47 +141,46 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
     section.table(ReportTable(columns, rows, "* not part of the actuator file", digits=5))
 
 
-def _ranking(report: Report, result: Calibration) -> None:
-    if result.dynamic is None:
+def _ranking(report: Report, ranking: Mapping[str, Any] | None) -> None:
+    if ranking is None:
         return
-    ranking = result.dynamic.ranking
     section = report.section(
         "What the logs can determine",
         "Sensitivities of speed and current of the model runs, scaled by a meaningful change of "
         "each parameter and by the residual's spread. Small singular values are directions that "
         "the logs do not see.",
     )
-    rows = [[k + 1, float(s)] for k, s in enumerate(ranking.singular_values)]
+    rows = [[k + 1, float(s)] for k, s in enumerate(ranking["singular_values"])]
     section.table(ReportTable(["", "Singular value"], rows, digits=4))
     section.table(
         ReportTable(
             ["Candidate", "Predicted deviation"],
-            sorted(ranking.predicted.items()),
+            sorted(ranking["predicted"].items()),
             "Relative for positive parameters, SI for offsets and delays.",
             digits=3,
         )
     )
-    pairs = [f"{a} and {b}: correlation {c:+.3f}" for a, b, c in ranking.pairs]
+    pairs = [f"{a} and {b}: correlation {c:+.3f}" for a, b, c in ranking["correlated"]]
     section.points(pairs or ["No pair is correlated by more than 0.95."])
     section.points(
-        [f"{p} left out: {why}" for p, why in ranking.dropped.items()]
+        [f"{p} left out: {why}" for p, why in ranking["dropped"].items()]
         or ["No candidate had to be left out."]
     )
 
 
-def _held_out(report: Report, result: Calibration) -> None:
-    if not result.held_out:
+def _held_out(report: Report, held_out: Sequence[Mapping[str, Any]]) -> None:
+    if not held_out:
         return
     rows = [
         [
-            h.log,
-            h.span,
-            h.speed * 30.0 / math.pi,
-            h.speed_all * 30.0 / math.pi,
-            h.current,
-            h.current_all,
+            h["log"],
+            h["span"],
+            h["speed_rms"] * 30.0 / math.pi,
+            h["speed_rms_all_data"] * 30.0 / math.pi,
+            h["current_rms"],
+            h["current_rms_all_data"],
         ]
-        for h in result.held_out
+        for h in held_out
     ]
     report.section(
         "Held-out logs",
@@ -226,10 +222,10 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
     ]
     rows = []
     for e in after.errors:
-        factor, unit = _AXES[e.signal]
+        factor, unit = _DISPLAY.get(e.unit, (1.0, e.unit))
         row: list[object] = [
             e.log,
-            _LABELS[e.signal],
+            _label(e.signal),
             unit,
             factor * e.rms,
             factor * e.largest,
@@ -242,25 +238,39 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
         rows.append(row)
     section.table(ReportTable([*columns, *(["RMS before"] if before else [])], rows, digits=3))
     earlier = {t.log: t for t in before.traces} if before else {}
+    units = {e.signal: e.unit for e in after.errors}
     for trace in after.traces:
         section.figure(
-            _traces(trace, earlier.get(trace.log), after.transient),
+            _traces(trace, earlier.get(trace.log), after.transient, units),
             f"{trace.log}: measured and simulated, residual, spectrum of the residual.",
         )
 
 
-def _traces(trace: ValidationTrace, before: ValidationTrace | None, transient: float) -> Figure:
-    with new_figure(3, 3, width=9.5, height=7.0, width_ratios=[2, 2, 1.4]) as (figure, axes):
+def _label(signal: str) -> str:
+    return _LABELS.get(signal, signal.replace("_", " "))
+
+
+def _traces(
+    trace: ValidationTrace,
+    before: ValidationTrace | None,
+    transient: float,
+    units: Mapping[str, str],
+) -> Figure:
+    names = [name for name in trace.simulated if name in units]
+    height = 0.4 + 2.2 * len(names)
+    with new_figure(
+        len(names), 3, width=9.5, height=height, squeeze=False, width_ratios=[2, 2, 1.4]
+    ) as (figure, axes):
         keep = trace.used
         time = trace.time[keep]
-        for row, name in enumerate(SIGNALS):
-            factor, unit = _AXES[name]
+        for row, name in enumerate(names):
+            factor, unit = _DISPLAY.get(units[name], (1.0, units[name]))
             data, model = factor * trace.measured[name], factor * trace.simulated[name]
             left, middle, right = axes[row]
             thin = slice(None, None, max(1, len(time) // 3000))
             left.plot(time[thin], data[keep][thin], color=COLOURS["grey"], lw=2.2, label="log")
             left.plot(time[thin], model[keep][thin], color=COLOURS["orange"], lw=0.9, label="model")
-            left.set(ylabel=f"{_LABELS[name]} [{unit}]")
+            left.set(ylabel=f"{_label(name)} [{unit}]")
             if before is not None:
                 residual = factor * (before.simulated[name] - before.measured[name])[keep]
                 middle.plot(
@@ -274,9 +284,9 @@ def _traces(trace: ValidationTrace, before: ValidationTrace | None, transient: f
             right.set(ylabel=f"{unit}/\N{SQUARE ROOT}Hz")
         axes[0][0].legend(loc="upper right")
         axes[0][1].legend(loc="upper right")
-        for axis in axes[2][:2]:
+        for axis in axes[-1][:2]:
             axis.set(xlabel=f"Time [s], from {transient:g} s")
-        axes[2][2].set(xlabel="Frequency [Hz]")
+        axes[-1][2].set(xlabel="Frequency [Hz]")
     return figure
 
 

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.calibrate.breakaway import breakaway_torque, stuck_stretches
-from elevon.calibrate.log import BenchLog
 from elevon.calibrate.motion import motion_of
 from elevon.calibrate.presliding import presliding_friction, reversals, usable_logs
-from elevon.calibrate.regression import Regression
+from elevon.estimate.regression import Regression
+from elevon.logs.log import Log
 
 __all__ = ["StaticFriction", "static_friction"]
 
@@ -59,16 +59,14 @@ class StaticFriction:
 
 
 def static_friction(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, constant: float
+    logs: Sequence[Log], plant: Regression, constant: float
 ) -> StaticFriction | None:
     """Estimate static friction by the way that the logs allow.
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         With the motor's angle; those whose brake acted unmeasured are passed over.
-    keeps : sequence of ndarray of bool
-        Samples that may be used, one a log.
     plant : Regression
         The torque balance.
     constant : float
@@ -82,8 +80,8 @@ def static_friction(
     slow = _SLOW * plant["dry"] / plant["inertia"] * max(log.period for log in logs)
     if not slow > 0.0:
         return None
-    if _gives(logs, keeps, plant, slow):
-        creep = presliding_friction(logs, keeps, plant, constant)
+    if _gives(logs, plant, slow):
+        creep = presliding_friction(logs, plant, constant)
         if creep is None:
             return None
         how = (
@@ -93,7 +91,7 @@ def static_friction(
         return StaticFriction(creep.static, creep.std, creep.degrees, 0.0, how)
     offset = plant["offset" if "offset" in plant.names else "constant"]
     torque_level = breakaway_torque(
-        logs, keeps, constant=constant, offset=offset, lag=plant["lag"], slow=slow
+        logs, constant=constant, offset=offset, lag=plant["lag"], slow=slow
     )
     if torque_level is None:
         return None
@@ -101,21 +99,18 @@ def static_friction(
     return StaticFriction(*torque_level, _RIPPLE * torque_level[0], how)
 
 
-def _gives(
-    logs: Sequence[BenchLog], keeps: Sequence[Bools], plant: Regression, slow: float
-) -> bool:
+def _gives(logs: Sequence[Log], plant: Regression, slow: float) -> bool:
     """Return whether the shaft deflects further than rounding while its torque turns.
 
     Reversals without a standstill say nothing in either direction; where there are no others the
     deflection is followed.
     """
     lengths = []
-    for log, keep in usable_logs(logs, keeps):
-        assert log.motor is not None
+    for log in usable_logs(logs):
         current = motion_of(log).current
         small = slow * log.period
         stuck = stuck_stretches(log.motor, max(2, round(_STUCK / log.period)), small)
-        for before, after in reversals(log, keep):
+        for before, after in reversals(log):
             for a, b in ((a, b) for a, b in stuck if before <= a and b <= after):
                 turn = abs(float(current[b] - current[a])) / (2.0 * plant["dry"])
                 if turn > 0.2:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.calibrate.kinematics import command_fit
-from elevon.calibrate.log import BenchLog
 from elevon.errors import InputError, Interrupted, unknown
+from elevon.experiment import Experiment, Inputs
 from elevon.logs.command.known import align_noted
 from elevon.logs.command.reconstruct import reconstruct
+from elevon.logs.drive import drive_log
+from elevon.logs.log import Log
+from elevon.plain import STORED, Plain, in_unit, key
 from elevon.progress import Progress
+from elevon.results import Result
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.report import Report
 
 __all__ = ["SIGNALS", "SignalError", "Validation", "validate"]
 
@@ -35,7 +40,7 @@ TRANSIENT = 10.0  # s, as the published comparison leaves out
 
 
 @dataclass(frozen=True)
-class SignalError:
+class SignalError(Plain):
     """Error of one signal of one log, after the transient.
 
     Attributes
@@ -56,35 +61,22 @@ class SignalError:
     signal: str
     unit: str
     rms: float
-    largest: float
-    of_rms: float
-    of_range: float
-    largest_of_range: float
-    limit: float | None
+    largest: Annotated[float, key("max")]
+    of_rms: Annotated[float, key("rms_percent_of_rms"), in_unit("%")]
+    of_range: Annotated[float, key("rms_percent_of_range"), in_unit("%")]
+    largest_of_range: Annotated[float, key("max_percent_of_range"), in_unit("%")]
+    limit: Annotated[float | None, key("limit_percent_of_range"), in_unit("%")]
+
+    COMPUTED: ClassVar = ("passed",)
 
     @property
     def passed(self) -> bool | None:
         """Whether the threshold is kept; None without one."""
         return None if self.limit is None else bool(self.of_range <= self.limit)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain types."""
-        return {
-            "log": self.log,
-            "signal": self.signal,
-            "unit": self.unit,
-            "rms": self.rms,
-            "max": self.largest,
-            "rms_percent_of_rms": self.of_rms,
-            "rms_percent_of_range": self.of_range,
-            "max_percent_of_range": self.largest_of_range,
-            "limit_percent_of_range": self.limit,
-            "passed": self.passed,
-        }
-
 
 @dataclass(frozen=True)
-class ValidationTrace:
+class ValidationTrace(Plain):
     """Measured and simulated signals of one log on its clock, for plots."""
 
     log: str
@@ -93,9 +85,44 @@ class ValidationTrace:
     simulated: Mapping[str, Floats]
     used: Bools
 
+    @classmethod
+    def of(cls, log: Log, run: Log, names: Mapping[str, str]) -> ValidationTrace:
+        """Return a log beside a run of it, channels by role named as stated."""
+        roles = [role for role in names if log.has(role) and run.has(role)]
+        measured, simulated = ({names[r]: item[r] for r in roles} for item in (log, run))
+        return cls(log.name, log.time, measured, simulated, log.good)
+
+    def errors(
+        self,
+        units: Mapping[str, str],
+        limits: Mapping[str, float] | None = None,
+        offsets: Mapping[str, float] | None = None,
+    ) -> list[SignalError]:
+        """Return the error of every channel where samples count, offsets taken off the log."""
+        rows = []
+        for name, simulated in self.simulated.items():
+            mask = self.used & np.isfinite(self.measured[name])
+            if not mask.any():
+                continue  # a stretch shorter than what settles shows nothing
+            data = self.measured[name][mask] - (offsets or {}).get(name, 0.0)
+            error = simulated[mask] - data
+            rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+            about, reach = float(np.std(data)), float(np.ptp(data))
+            of_rms, of_range, largest_of_range = (
+                100.0 * value / size if size > 0.0 else float("nan")
+                for value, size in ((rms, about), (rms, reach), (largest, reach))
+            )
+            rows.append(
+                SignalError(
+                    self.log, name, units[name], rms, largest, of_rms, of_range,
+                    largest_of_range, (limits or {}).get(name),
+                )
+            )  # fmt: skip
+        return rows
+
 
 @dataclass(frozen=True)
-class Validation:
+class Validation(Result):
     """Errors of all logs.
 
     Attributes
@@ -120,12 +147,34 @@ class Validation:
 
     actuator: str
     fidelity: str
-    transient: float
-    errors: tuple[SignalError, ...]
+    transient: Annotated[float, key("transient_s"), in_unit("s")]
+    errors: Annotated[tuple[SignalError, ...], key("signals")]
     commands: Mapping[str, str]
-    traces: tuple[ValidationTrace, ...]
+    traces: Annotated[tuple[ValidationTrace, ...], STORED]
     offsets: Mapping[str, float] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
+
+    KIND: ClassVar = "validation"
+    COMPUTED: ClassVar = ("status",)
+    TABLE: ClassVar = "errors"
+    BARS: ClassVar = ("signal", "rms_percent_of_range")
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        judged = [error for error in self.errors if error.passed is not None]
+        over = [f"{e.signal} of {e.log}" for e in judged if not e.passed]
+        if not judged:
+            return f"{self.actuator}: measured; the actuator file has no thresholds."
+        if over:
+            return f"{self.actuator}: not passed; over its threshold: {', '.join(over)}."
+        return f"{self.actuator}: passed; {len(judged)} signals within their thresholds."
+
+    def report(self, *, date: str | None = None) -> Report:
+        """Return its page."""
+        from elevon.calibrate.report import validation_report
+
+        return validation_report(self, date=date)
 
     @property
     def status(self) -> str:
@@ -135,22 +184,9 @@ class Validation:
             return "measured"
         return "pass" if all(judged) else "fail"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": self.status,
-            "actuator": self.actuator,
-            "fidelity": self.fidelity,
-            "transient_s": self.transient,
-            "signals": [e.to_dict() for e in self.errors],
-            "commands": dict(self.commands),
-            "offsets": dict(self.offsets),
-            "notes": dict(self.notes),
-        }
-
 
 def validate(
-    logs: Sequence[BenchLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
     fidelity: str = "low",
@@ -161,7 +197,7 @@ def validate(
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         With the encoder's position.
     actuator : Actuator
         The model; thresholds and the sensors' offsets from its ``[validation]`` table.
@@ -180,6 +216,7 @@ def validate(
     limits, offsets = _promised(actuator, "limits"), _promised(actuator, "offsets")
     if not logs:
         raise InputError("validation needs at least one log")
+    logs = [drive_log(log) for log in logs]
     given = transient
     if given is None:
         given = float((actuator.validation or {}).get("transient", TRANSIENT))
@@ -198,7 +235,7 @@ def validate(
             notes[log.name] = (
                 "the brake acted but its torque is not known: the run has none, nothing is judged"
             )
-        errors += _errors(trace, {} if log.name in notes else limits)
+        errors += trace.errors(SIGNALS, {} if log.name in notes else limits)
     return Validation(
         actuator.name, fidelity, given, tuple(errors), commands, tuple(traces), offsets, notes
     )
@@ -214,16 +251,13 @@ def _promised(actuator: Actuator, key: str) -> dict[str, float]:
 
 
 def _trace(
-    log: BenchLog,
+    log: Log,
     actuator: Actuator,
     fidelity: str,
     transient: float,
     offsets: Mapping[str, float],
 ) -> tuple[ValidationTrace, str]:
-    from elevon.scenario import Scenario
-    from elevon.simulate import simulate
-
-    if log.output is None or log.motor is None:
+    if not log.has("output_position") or not log.has("motor_position"):
         raise InputError(
             f"{log.name}: validation needs both positions (r4820, r4821): they give the command "
             "and the backlash"
@@ -236,74 +270,51 @@ def _trace(
     # The model's own zero is the motor's; the encoder's offset moves the command along.
     shift = float(log.motor[0])
     middle = shift / ratio
-    scenario = Scenario.from_dict(
-        {
-            "duration": log.duration,
-            "command": {
-                "mode": "position",
-                "terms": [
-                    {"kind": "table", "times": log.time.tolist(), "values": command.tolist()}
-                ],
-            },
-            "load": {
-                "brake": {
-                    "terms": [
-                        {
-                            "kind": "table",
-                            "times": brake[0].tolist(),
-                            "values": brake[1].tolist(),
-                        }
-                    ]
-                }
-            },
-            "initial": {
-                "motor_position": shift,
-                "motor_speed": float(log.speed[0]),
-                "output_position": _start(log, offset, middle, actuator),
-            },
-        }
-    )
+    inputs = Inputs(
+        log.duration, "position", (log.time, command), loads={"brake": brake},
+        initial={
+            "motor_position": shift,
+            "motor_speed": float(log.speed[0]),
+            "output_position": _start(log, offset, middle, actuator),
+        },
+    )  # fmt: skip
     model = actuator
     feedback = str(actuator.parameters["control.position_feedback"].value)
     if feedback == "output" and offset != 0.0:
         model = actuator.with_values({"control.position_feedback": "encoder"})
-    rate = f"{1.0 / log.period:.9g} Hz"
-    recording = simulate(model, scenario, fidelity=fidelity, record=_record(model, fidelity, rate))
-    clock = recording["motor_speed"].time
-    simulated = {name: np.interp(log.time, clock, recording[name].values) for name in SIGNALS}
-    logged = {
-        "encoder_position": log.output,
-        "motor_speed": log.speed,
-        "current_q_meas": log.current,
+    shows, rate = {name: name for name in SIGNALS}, _rate(model, fidelity, log.period)
+    experiment = Experiment(log, model, inputs, shows, rate=rate, fidelity=fidelity, notices=True)
+    run = next(experiment.run()).seen(log)
+    logged = (log.output, log.speed, log.current)
+    measured = {
+        name: values - offsets.get(name, 0.0) for name, values in zip(SIGNALS, logged, strict=True)
     }
-    measured = {name: values - offsets.get(name, 0.0) for name, values in logged.items()}
     used = log.good & (log.time >= transient)
-    return ValidationTrace(log.name, log.time, measured, simulated, used), how
+    return ValidationTrace(log.name, log.time, measured, run.channels, used), how
 
 
-def _record(actuator: Actuator, fidelity: str, rate: str) -> str:
-    """Signals at the log's rate, or at every step where that is no whole number of steps."""
+def _rate(actuator: Actuator, fidelity: str, period: float) -> str:
+    """The log's rate, or every step where that is no whole number of steps."""
     from elevon.simulate import solver_step
 
     step = solver_step(actuator, fidelity)
-    steps = 1.0 / (float(rate.split(maxsplit=1)[0]) * step)
+    steps = float(f"{period / step:.9g}")
     whole = abs(steps - round(steps)) < 1e-6 * steps and round(steps) >= 1
-    return f"{','.join(SIGNALS)}@{f'{1.0 / (round(steps) * step):.12g} Hz' if whole else 'every'}"
+    return f"{1.0 / (round(steps) * step):.12g} Hz" if whole else "every"
 
 
-def _start(log: BenchLog, offset: float, middle: float, actuator: Actuator) -> float:
+def _start(log: Log, offset: float, middle: float, actuator: Actuator) -> float:
     """Return where the output begins: as the encoder shows it, at an end of the backlash at most.
 
     What noise and errors of the sensors add beyond the backlash is nowhere an actuator can stand.
     """
-    assert log.output is not None
     first = float(log.output[0]) - offset if np.isfinite(log.output[0]) else middle
     value = actuator.parameters.value
     half = 0.5 * (value("backlash.total") + value("backlash.extra"))
     return float(np.clip(first, middle - half, middle + half))
 
 
-def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
+def _command(log: Log, actuator: Actuator) -> tuple[Floats, str]:
     """The command: a waveform where one explains the set point, else the trace itself.
 
     Where the set point is held at its limit the trace is not known; the waveform fills it, or a
@@ -311,7 +322,6 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
     """
     value = actuator.parameters.value
     gain, limit = value("control.position_gain"), value("control.speed_limit")
-    assert log.output is not None
     trace = reconstruct(log.time, log.speed_ref, log.output, gain=gain, limit=limit)
     if trace.coverage < 0.05:
         raise InputError(
@@ -328,26 +338,3 @@ def _command(log: BenchLog, actuator: Actuator) -> tuple[Floats, str]:
     inside = (log.time >= fit.waveform.window[0]) & (log.time <= fit.waveform.window[1])
     saturated = ~trace.valid & (log.time <= fit.waveform.window[1])
     return np.where(inside | saturated, fit.values, known), f"{fit.waveform.kind} fitted to the log"
-
-
-def _errors(trace: ValidationTrace, limits: Mapping[str, float]) -> list[SignalError]:
-    errors = []
-    for name, unit in SIGNALS.items():
-        data, model = trace.measured[name][trace.used], trace.simulated[name][trace.used]
-        error = model - data
-        rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
-        spread, reach = float(np.std(data)), float(np.ptp(data))
-        errors.append(
-            SignalError(
-                trace.log,
-                name,
-                unit,
-                rms,
-                largest,
-                100.0 * rms / spread if spread > 0.0 else float("nan"),
-                100.0 * rms / reach if reach > 0.0 else float("nan"),
-                100.0 * largest / reach if reach > 0.0 else float("nan"),
-                limits.get(name),
-            )
-        )
-    return errors

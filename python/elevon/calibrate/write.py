@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-from elevon.calibrate.estimate import LEVEL, Estimate
-from elevon.calibrate.promise import thresholds
+from elevon.calibrate.thresholds import thresholds
+from elevon.estimate import LEVEL
 from elevon.files import write_text
 from elevon.parameters import Parameter
 from elevon.parameters.records import record_of
@@ -16,19 +15,15 @@ from elevon.parameters.write import updated_set
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.by_parts import PartsCalibration
-    from elevon.calibrate.calibration import Calibration
-    from elevon.calibrate.closed_loop import LoopCalibration
+    from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import Validation
 
-__all__ = ["calibrated_parameters", "set_text", "write_calibration", "write_values"]
-
-Answer: TypeAlias = "Calibration | LoopCalibration | PartsCalibration"
+__all__ = ["calibrated_parameters", "set_text", "write_calibration"]
 
 
-def calibrated_parameters(result: Answer) -> list[Parameter]:
+def calibrated_parameters(result: Calibration) -> list[Parameter]:
     """Return the changed parameters with source, old value and interval."""
-    reasons = getattr(result, "undetermined", {})
+    reasons = result.undetermined
     names = ", ".join(log.name for log in result.logs)
     source = f"calibrated from {names}"
     known = {item.path: item for item in result.estimates if item.in_set}
@@ -74,7 +69,7 @@ def _followed(path: str) -> str:
     return reasons.get(path, "scaled with motor.inertia: only the sum is determined")
 
 
-def set_text(result: Answer, *, name: str, base: str, validation: Validation | None) -> str:
+def set_text(result: Calibration, *, name: str, base: str, validation: Validation | None) -> str:
     """Return the TOML text of the calibrated actuator file."""
     import tomlkit
 
@@ -102,7 +97,7 @@ def set_text(result: Answer, *, name: str, base: str, validation: Validation | N
 
 def write_calibration(
     path: str | os.PathLike[str],
-    result: Answer,
+    result: Calibration,
     *,
     validation: Validation | None = None,
     force: bool = False,
@@ -124,35 +119,6 @@ def write_calibration(
     name = _name(target.stem)
     text = set_text(result, name=name, base=_base(result.before, target), validation=validation)
     return write_text(target, text, force=force)
-
-
-def write_values(
-    path: str | os.PathLike[str],
-    before: Actuator,
-    estimates: Sequence[Estimate],
-    source: str,
-    *,
-    force: bool = False,
-) -> Path:
-    """Write an actuator file that changes the estimated values alone, with their intervals."""
-    import tomlkit
-
-    target = Path(path).expanduser()
-    head = tomlkit.document()
-    head.add("name", tomlkit.item(_name(target.stem)))
-    head.add("base", tomlkit.item(_base(before, target)))
-    changes = []
-    for item in estimates:
-        if item.in_set:
-            unit = before.parameters[item.path].unit or _unit(before.wiring, item.path)
-            note = f"{item.note}; {100 * LEVEL:.0f} % interval"
-            origin = f"calibrated from {source}"
-            changes.append(
-                Parameter(
-                    item.path, item.value, unit, origin, note, "calibrated", item.old, item.interval
-                )
-            )
-    return write_text(target, updated_set(tomlkit.dumps(head), changes), force=force)
 
 
 def _name(stem: str) -> str:

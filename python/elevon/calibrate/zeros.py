@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from elevon.calibrate.backlash import BacklashFit, fit_backlash
 from elevon.calibrate.backlashes import backlashes_differ, differing_backlashes, pooled_backlash
-from elevon.calibrate.estimate import Estimate, quantile
 from elevon.calibrate.kinematics import CommandFit, speed_limit, speed_sensor
-from elevon.calibrate.log import BenchLog
+from elevon.calibrate.named import named
+from elevon.estimate import Estimate, quantile
+from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -26,13 +27,13 @@ _LOOSE = 0.05  # relative deviation above which the position gain is not determi
 
 
 def position_estimates(
-    logs: Sequence[BenchLog], actuator: Actuator, per_log: Sequence[str] = ()
+    logs: Sequence[Log], actuator: Actuator, per_log: Sequence[str] = ()
 ) -> tuple[list[Estimate], tuple[str, ...]]:
     """Return backlash, encoder, speed sensor, speed limit as far as the logs show, and words.
 
     Parameters
     ----------
-    logs : sequence of BenchLog
+    logs : sequence of Log
         The data.
     actuator : Actuator
         Values before.
@@ -40,11 +41,15 @@ def position_estimates(
         Of `elevon.calibrate.backlashes.PER_LOG`: estimated for each log.
     """
     estimates, findings = _backlash_estimates(logs, actuator, "backlash.total" in per_log)
-    return [*estimates, *_speed_estimates(logs), *_limit_estimates(logs, actuator)], findings
+    return [
+        *estimates,
+        *_speed_estimates(logs, actuator),
+        *_limit_estimates(logs, actuator),
+    ], findings
 
 
 def _backlash_estimates(
-    logs: Sequence[BenchLog], actuator: Actuator, each: bool
+    logs: Sequence[Log], actuator: Actuator, each: bool
 ) -> tuple[list[Estimate], tuple[str, ...]]:
     """Backlash and encoder; where backlashes differ the encoder alone, and each log's backlash."""
     value = actuator.parameters.value
@@ -54,7 +59,7 @@ def _backlash_estimates(
     if backlash is None:
         return [], ()
     estimates = _backlash(backlash, count, actuator)
-    estimates += [_initial(log, backlash, count, ratio) for log in logs if _both_positions(log)]
+    estimates += [_initial(log, backlash, count, actuator) for log in logs if _both_positions(log)]
     fitted = backlashes
     if each and not backlashes:
         fits = {log.name: fit_backlash([log], ratio, count) for log in logs}
@@ -73,47 +78,27 @@ def _own_backlash(name: str, backlash: BacklashFit, count: float, actuator: Actu
     return replace(total, path=f"backlash.total[{name}]", in_set=False, note="of this log alone")
 
 
-def _speed_estimates(logs: Sequence[BenchLog]) -> list[Estimate]:
+def _speed_estimates(logs: Sequence[Log], actuator: Actuator) -> list[Estimate]:
     """Gain and offset of the speed sensor."""
-    sensor = speed_sensor(logs) or {}
     units = {"gain": "1", "offset": "rad/s"}
+    note = "of the logged speed against the motor's angle"
     return [
-        _made(
-            f"sensor.speed_{name}",
-            number,
-            std,
-            math.inf,
-            unit=units[name],
+        named(
+            Estimate(*pair), f"sensor.speed_{name}", actuator, note, unit=units[name],
             register="sensor",
-            old=None,
-            note="of the logged speed against the motor's angle",
         )
-        for name, (number, std) in sensor.items()
-    ]
+        for name, pair in (speed_sensor(logs) or {}).items()
+    ]  # fmt: skip
 
 
-def _limit_estimates(logs: Sequence[BenchLog], actuator: Actuator) -> list[Estimate]:
+def _limit_estimates(logs: Sequence[Log], actuator: Actuator) -> list[Estimate]:
     """Limit of the speed, where a log holds it and it is not the actuator file's."""
-    old = actuator.parameters.value("control.speed_limit")
+    path = "control.speed_limit"
     limit = speed_limit(logs)
-    if limit is None or abs(limit / old - 1.0) <= _OTHER:
+    if limit is None or abs(limit / actuator.parameters.value(path) - 1.0) <= _OTHER:
         return []
-    ends = (limit * (1 - 2e-4), limit * (1 + 2e-4))
-    note = "held flat in the log"
-    return [
-        Estimate(
-            "control.speed_limit",
-            limit,
-            1e-4 * limit,
-            ends,
-            "rad/s",
-            "controller",
-            old,
-            "direct",
-            (),
-            note,
-        )
-    ]
+    number = Estimate(limit, 1e-4 * limit, interval=(limit * (1 - 2e-4), limit * (1 + 2e-4)))
+    return [named(number, path, actuator, "held flat in the log")]
 
 
 def encoder_count(actuator: Actuator) -> float:
@@ -125,135 +110,77 @@ def encoder_count(actuator: Actuator) -> float:
 
 def _backlash(backlash: BacklashFit, count: float, actuator: Actuator) -> list[Estimate]:
     value = actuator.parameters.value
-    extra = value("backlash.extra")
-    total, offset = backlash.backlash[0] - extra, backlash.offset[0] + 0.5 * count
+    total, rounded = backlash.backlash[0] - value("backlash.extra"), _ROUNDED * count
+    number = Estimate(total, math.hypot(backlash.backlash[1], rounded), backlash.degrees)
+    floats = "; it floats: from the span" if backlash.floats else ""
+    if backlash.beyond > 0.0:
+        deflected = math.degrees(backlash.beyond)
+        floats += f" without load; under load {deflected:.2g} deg more"
     # The model's encoder truncates; one that rounds would sit half a count lower.
-    offset_std = math.hypot(backlash.offset[1], count / math.sqrt(12.0))
-    rounded = _ROUNDED * count
-    total_std = math.hypot(backlash.backlash[1], rounded)
-    resolver = value("sensor.resolver.offset") / value("gear.ratio")
+    offset = (
+        backlash.offset[0] + 0.5 * count + value("sensor.resolver.offset") / value("gear.ratio")
+    )
+    note = "encoder less motor over ratio, backlash centred: only the difference is known"
     rows = [
-        _made(
-            "backlash.total",
-            total,
-            total_std,
-            backlash.degrees,
-            unit="rad",
-            register="plant",
-            old=value("backlash.total"),
-            note=f"total, at the output{'; it floats: from the span' if backlash.floats else ''}",
+        named(
+            number, "backlash.total", actuator, f"total, at the output{floats}",
             in_set=total >= 0.0,
         ),
-        _made(
-            "sensor.encoder.offset",
-            offset + resolver,
-            offset_std,
-            math.inf,
-            half=quantile(backlash.degrees) * math.hypot(backlash.offset[1], rounded) + 0.5 * count,
-            unit="rad",
-            register="sensor",
-            old=value("sensor.encoder.offset"),
-            note="encoder less motor over ratio, backlash centred: only the difference is known",
-        ),
-    ]
+        named(_counted(offset, backlash, count), "sensor.encoder.offset", actuator, note),
+    ]  # fmt: skip
     return rows if backlash.floats else [*rows, *_encoder(backlash, actuator, rounded)]
 
 
-def _both_positions(log: BenchLog) -> bool:
-    return log.motor is not None and log.output is not None
+def _counted(value: float, backlash: BacklashFit, count: float) -> Estimate:
+    """A place between two positions, known to half a count of the encoder at best."""
+    half = quantile(backlash.degrees) * math.hypot(backlash.offset[1], _ROUNDED * count)
+    half += 0.5 * count
+    std = math.hypot(backlash.offset[1], count / math.sqrt(12.0))
+    return Estimate(value, std, interval=(value - half, value + half))
 
 
-def _initial(log: BenchLog, backlash: BacklashFit, count: float, ratio: float) -> Estimate:
+def _both_positions(log: Log) -> bool:
+    return log.has("motor_position") and log.has("output_position")
+
+
+def _initial(log: Log, backlash: BacklashFit, count: float, actuator: Actuator) -> Estimate:
     """Where in the backlash the motor stood when a log began."""
-    assert log.motor is not None
-    assert log.output is not None
+    ratio = actuator.parameters.value("gear.ratio")
     seen = backlash.gain[0] * log.motor[0] / ratio + backlash.offset[0] - log.output[0]
-    return _made(
-        f"initial.lead[{log.name}]",
-        float(seen),
-        math.hypot(backlash.offset[1], count / math.sqrt(12.0)),
-        math.inf,
-        half=quantile(backlash.degrees) * math.hypot(backlash.offset[1], _ROUNDED * count)
-        + 0.5 * count,
-        unit="rad",
-        register="initial",
-        old=None,
-        note="motor over ratio less output at the first sample; 0: the middle of the backlash",
-    )
+    note = "motor over ratio less output at the first sample; 0: the middle of the backlash"
+    number = _counted(float(seen), backlash, count)
+    path = f"initial.lead[{log.name}]"
+    return named(number, path, actuator, note, unit="rad", register="initial")
 
 
 def _encoder(backlash: BacklashFit, actuator: Actuator, rounded: float) -> list[Estimate]:
     """Delay and gain of the encoder against the motor's sensor."""
     # All counts between the turns determine the gain, only those at the turns are rounded alike.
     gain, std = backlash.gain[0], math.hypot(backlash.gain[1], _TURNS * rounded / backlash.reach)
-    seen = abs(gain - 1.0) > max(3.0 * std, 1e-4)
+    note = "of the encoder behind the motor's sensor"
     return [
-        _made(
-            "sensor.encoder_delay",
-            backlash.delay[0],
-            backlash.delay[1],
-            backlash.degrees,
-            unit="s",
-            register="sensor",
-            old=None,
-            note="of the encoder behind the motor's sensor",
+        named(
+            Estimate(*backlash.delay, backlash.degrees), "sensor.encoder_delay", actuator, note,
+            unit="s", register="sensor",
         ),
-        _made(
-            "sensor.encoder.gain",
-            gain,
-            std,
-            backlash.degrees,
-            unit="1",
-            register="sensor",
-            old=actuator.parameters.value("sensor.encoder.gain"),
-            note="encoder over motor and ratio",
-            in_set=seen,
+        named(
+            Estimate(gain, std, backlash.degrees), "sensor.encoder.gain", actuator,
+            "encoder over motor and ratio", in_set=abs(gain - 1.0) > max(3.0 * std, 1e-4),
         ),
-    ]
+    ]  # fmt: skip
 
 
-def _made(
-    path: str,
-    number: float,
-    std: float,
-    degrees: float,
-    *,
-    unit: str,
-    register: str,
-    old: float | None,
-    note: str,
-    in_set: bool | None = None,
-    half: float | None = None,
-) -> Estimate:
-    half = quantile(degrees) * std if half is None else half
-    inside = old is not None if in_set is None else in_set
-    return Estimate(
-        path,
-        number,
-        std,
-        (number - half, number + half),
-        unit,
-        register,
-        old,
-        "direct",
-        (),
-        note,
-        inside,
-    )
-
-
-def gain_estimate(fits: Sequence[CommandFit], old: float, count: float) -> Estimate | None:
+def gain_estimate(fits: Sequence[CommandFit], actuator: Actuator) -> Estimate | None:
     """Position gain pooled over the commands; the logs' scatter counts where it is larger.
 
     Parameters
     ----------
     fits : sequence of CommandFit
         One a log.
-    old : float
-        Gain before [1/s].
-    count : float
-        One count of the encoder at the output [rad]: what rounding may shift counts like noise.
+    actuator : Actuator
+        Values before, and the count of the encoder: what rounding may shift counts like noise.
     """
+    count = encoder_count(actuator)
     rounded = [math.hypot(fit.gain_std, _FLAT * count * fit.gain / fit.reach) for fit in fits]
     good = [
         (fit, std) for fit, std in zip(fits, rounded, strict=True) if 0.0 < std < _LOOSE * fit.gain
@@ -264,13 +191,6 @@ def gain_estimate(fits: Sequence[CommandFit], old: float, count: float) -> Estim
     gain = sum(fit.gain / std**2 for fit, std in good) / total
     chi = sum(((fit.gain - gain) / std) ** 2 for fit, std in good)
     spread = max(1.0, chi / max(len(good) - 1, 1))
-    return _made(
-        "control.position_gain",
-        gain,
-        math.sqrt(spread / total),
-        max(len(good) - 1.0, 2.0),
-        unit="1/s",
-        register="controller",
-        old=old,
-        note=f"from the command's waveform in {', '.join(fit.log for fit, _ in good)}",
-    )
+    note = f"from the command's waveform in {', '.join(fit.log for fit, _ in good)}"
+    number = Estimate(gain, math.sqrt(spread / total), max(len(good) - 1.0, 2.0))
+    return named(number, "control.position_gain", actuator, note)

@@ -46,7 +46,7 @@ def run_block(
     numbers: Sequence[int],
     *,
     threads: int | None = None,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Item:
     """Simulate a block and write its tables; what is returned goes into the work's log.
 
@@ -122,7 +122,7 @@ def write_block(
     index: int,
     numbers: Sequence[int],
     tables: Mapping[str, pa.Table],
-    outcome: Mapping[str, Any],
+    outcome: Mapping[str, object],
     *,
     mark: str,
 ) -> Item:
@@ -179,8 +179,8 @@ def simulate_block(
     resolved: Resolved,
     prepared: Sequence[Prepared],
     threads: int | None,
-    progress: Callable[[float], Any] | None,
-) -> list[dict[str, Any]]:
+    progress: Callable[[float], object] | None,
+) -> list[dict[str, object]]:
     """Simulate a block; a run that the core refuses after all is set apart, with its reason."""
     options = {"fidelity": resolved.fidelity, "threads": threads}
     try:

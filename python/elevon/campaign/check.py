@@ -50,7 +50,7 @@ class Checked:
     idle: list[str] = field(default_factory=list)
 
 
-def check(resolved: Resolved, progress: Callable[[float], Any] | None = None) -> Checked:
+def check(resolved: Resolved, progress: Callable[[float], object] | None = None) -> Checked:
     """Check all runs: every value against its range, every run's values together.
 
     What decides how a run is prepared (which faults, which scenario) is worked out once for all

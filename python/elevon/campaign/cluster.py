@@ -46,8 +46,8 @@ _PAUSE = 0.02
 def in_cluster(
     work: CampaignWork,
     address: str,
-    progress: Callable[[float], Any] | None,
-    announce: Callable[[str], Any] | None = None,
+    progress: Callable[[float], object] | None,
+    announce: Callable[[str], object] | None = None,
 ) -> None:
     """Have the missing blocks of a campaign done by a cluster.
 
@@ -107,15 +107,28 @@ class _Workers:
         return int(about.get("n_workers", len(about["workers"])))
 
     def look(self, *, idle: bool) -> None:
-        """Raise where the scheduler has gone; say so where nobody works."""
-        if self._client.status == "running":
+        """Raise where the scheduler has gone or is silent; say so where nobody works."""
+        if not idle:
+            self._seen, self._waits = time.monotonic(), False
+            return
+        if self._client.status == "running" and self._answers():
             self._seen = time.monotonic()
+            waits = self.count() == 0
+            if waits and not self._waits and self._announce is not None:
+                self._announce("waiting for workers (0)")
+            self._waits = waits
         elif self._client.status == "closed" or time.monotonic() - self._seen > LIMIT / 2.0:
             raise _lost(self._address)
-        waits = idle and self.count() == 0
-        if waits and not self._waits and self._announce is not None:
-            self._announce("waiting for workers (0)")
-        self._waits = waits
+
+    def _answers(self) -> bool:
+        """Return whether the scheduler greets who connects: one that is halted keeps the line."""
+        if _LOCAL.fullmatch(self._address):
+            return True
+        try:
+            check_scheduler(self._address)
+        except InputError:
+            return False
+        return True
 
 
 def _finished(pending: set[Any]) -> set[Any]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from elevon.campaign.part import Part
 from elevon.campaign.resolved_file import read_resolved
 from elevon.campaign.runs_table import RUNS
-from elevon.campaign.store import Manifest, read_manifest, work_log
+from elevon.campaign.store import Manifest, read_manifest, repair_hint, work_log
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording.old import warn_of_old_names
 from elevon.retired import current
@@ -231,7 +231,7 @@ class Dataset:
         """One row a run: unit, split, seed, status, reason, faults and other drawn values."""
         about = None if self.manifest.status == "running" else self.manifest.files.get(RUNS)
         path = located(self.folder, RUNS, about)
-        part = Part(path, 0, len(self) - 1, about)
+        part = Part(path, 0, len(self) - 1, about, repair_hint(self.folder))
         return Table(str(path), [part], is_old=self.manifest.is_old)
 
     @property
@@ -307,8 +307,9 @@ class Dataset:
         return recorded(self, number)
 
     def _table(self, place: str, clock: str) -> Table:
+        remedy = f"; elevon campaign resume {self.folder} simulates its runs again"
         parts = [
-            Part(self.folder / name, item.data["first"], item.data["last"], about)
+            Part(self.folder / name, item.data["first"], item.data["last"], about, remedy)
             for item in self.items
             for name, about in item.files.items()
             if name.startswith(f"{place}/")

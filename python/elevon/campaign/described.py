@@ -17,7 +17,7 @@ KEY = b"elevon"
 
 
 def block_description(
-    mark: str, name: str, span: tuple[int, int], files: Mapping[str, Any]
+    mark: str, name: str, span: tuple[int, int], files: Mapping[str, object]
 ) -> dict[str, str]:
     """Return the metadata of a block's table of ends, which is written after its other files.
 
@@ -47,7 +47,7 @@ def block_description(
     return {KEY.decode(): packed(about)}
 
 
-def read_description(path: Path) -> dict[str, Any] | None:
+def read_description(path: Path) -> dict[str, object] | None:
     """Return what a block's table of ends says of the block; None where it is not whole."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -58,7 +58,7 @@ def read_description(path: Path) -> dict[str, Any] | None:
         return None
 
 
-def described_blocks(folder: Path) -> dict[str, dict[str, Any]]:
+def described_blocks(folder: Path) -> dict[str, dict[str, object]]:
     """Return the descriptions of all blocks of a folder that have one, by name."""
     abouts = {}
     for path in sorted((folder / ENDS).glob("*.parquet")):

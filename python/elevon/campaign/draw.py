@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,11 +14,10 @@ from elevon.campaign.grammar import Axis, Draw, Growth, Random, Spread, Target
 from elevon.errors import InputError
 from elevon.faults import find_record
 from elevon.parameters.records import record_of
-from elevon.units import check_kind, parse_quantity, parse_unit, si_unit, to_si
+from elevon.units import check_kind, parse_quantity, parse_unit, si_unit, split_quantity, to_si
 
 __all__ = ["Column", "axis_values", "column_of", "random_values", "ranged", "read_values", "sample"]
 
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.S)
 
 Values = npt.NDArray[Any]
 Ranged = Axis | Draw | Spread | Growth
@@ -229,23 +227,23 @@ def _number(value: Any, place: str) -> tuple[float, str] | None:
     """Return a value in SI and its unit, None where it is no quantity."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value), ""
-    match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
-    if match is None:
+    parts = split_quantity(value) if isinstance(value, str) else None
+    if parts is None:
         return None
     try:
-        parse_unit(match[2] or "1")
+        parse_unit(parts[1] or "1")
     except InputError:
         return None
-    unit = si_unit(match[2]) if match[2] else ""
+    unit = si_unit(parts[1]) if parts[1] else ""
     return parse_quantity(value, unit or "1", place), unit
 
 
 def _split(given: Any, place: str) -> tuple[float, str]:
     if isinstance(given, str):
-        match = _QUANTITY.fullmatch(given)
-        if match is None:
+        parts = split_quantity(given)
+        if parts is None:
             raise InputError(f"{place}: {given!r} is not a number with a unit")
-        return float(match[1]), match[2]
+        return float(parts[0]), parts[1]
     try:
         return float(given), ""
     except OverflowError:

@@ -71,7 +71,9 @@ def last_values(row: Mapping[str, Any]) -> dict[str, float]:
     return {name: value for name, value in row.items() if name not in {"run", *_OUTCOME}}
 
 
-def read_ends(folder: Path, files: Mapping[str, dict[str, Any]]) -> dict[str, list[Any]] | None:
+def read_ends(
+    folder: Path, files: Mapping[str, dict[str, object]]
+) -> dict[str, list[object]] | None:
     """Return how a block's runs ended, from its own table; None where that is not whole."""
     import pyarrow.parquet as pq
 

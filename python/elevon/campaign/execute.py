@@ -74,7 +74,7 @@ def run_campaign(
     threads: int | None = None,
     cluster: str | None = None,
     progress: Report | None = None,
-    announce: Callable[[str], Any] | None = None,
+    announce: Callable[[str], object] | None = None,
 ) -> CampaignResult:
     """Run a plan into a folder, or go on with one that was interrupted.
 
@@ -130,7 +130,7 @@ def resume_campaign(
     threads: int | None = None,
     cluster: str | None = None,
     progress: Report | None = None,
-    announce: Callable[[str], Any] | None = None,
+    announce: Callable[[str], object] | None = None,
 ) -> CampaignResult:
     """Go on with a campaign from what its folder says; the plan file is not needed.
 

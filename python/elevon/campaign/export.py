@@ -29,7 +29,7 @@ def export(
     runs: Sequence[int] | None = None,
     *,
     force: bool = False,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> list[Path]:
     """Write runs as files of their own: ``run_NNNNNN.mat`` and ``runs.mat``, or other formats.
 
@@ -155,7 +155,7 @@ def _write_table(ds: Dataset, path: Path, numbers: Sequence[int], *, force: bool
 
 def _write_mat(table: Any, units: dict[str, str], path: Path) -> None:
     """Write the struct ``runs`` of columns, and ``names`` and ``units`` of these."""
-    from scipy.io import savemat
+    from elevon.recording.mat import write_structs
 
     named = identifiers(table.column_names)
     columns = {}
@@ -169,4 +169,4 @@ def _write_mat(table: Any, units: dict[str, str], path: Path) -> None:
         "names": {short: name for name, short in named.items()},
         "units": {short: units.get(name, "") for name, short in named.items()},
     }
-    savemat(path, content, appendmat=False, format="5", oned_as="column")
+    write_structs(path, content)

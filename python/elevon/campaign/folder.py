@@ -36,7 +36,7 @@ from elevon.record_plan import ClockPlan
 from elevon.transaction import Transaction, is_staged, settle
 from elevon.worklog import LOCK, Item, WorkLog, digest
 
-__all__ = ["CampaignWork", "begin", "finish", "finished", "open_folder"]
+__all__ = ["CampaignWork", "begin", "drop_log", "finish", "finished", "open_folder"]
 
 
 _LONGEST = 2**30
@@ -159,12 +159,13 @@ def _parts(split: Mapping[str, Any]) -> str:
 
 
 def finished(work: CampaignWork) -> dict[str, list[Any]] | None:
-    """Return how every run ended where the campaign is finished and nothing is to be done."""
+    """Return how every run ended where the campaign is finished; a log left beside it goes."""
     files = Item("tables", work.manifest.files, {})
     if work.manifest.status == "running" or work.missing or not files.intact(work.folder):
         return None
     if read_manifest(work.folder) != work.manifest:
         return None
+    drop_log(work.folder)
     return read_outcome(work.folder / RUNS)
 
 
@@ -197,12 +198,19 @@ def finish(work: CampaignWork, plan: str | None = None) -> dict[str, list[Any]]:
     manifest.status = "failed" if failed else "ok"
     manifest.split = work.resolved.split
     describe_anew(change, manifest)
-    (work.folder / LOG).unlink(missing_ok=True)
+    drop_log(work.folder)
     return outcome
 
 
+def drop_log(folder: Path) -> bool:
+    """Remove the log of work that the manifest describes, which a killed process left there."""
+    there = (folder / LOG).is_file()
+    (folder / LOG).unlink(missing_ok=True)
+    return there
+
+
 def stage_tables(
-    change: Transaction, resolved: Resolved, plan: str, outcome: Mapping[str, Sequence[Any]]
+    change: Transaction, resolved: Resolved, plan: str, outcome: Mapping[str, Sequence[object]]
 ) -> None:
     """Stage the resolved plan and the table of the runs, which carries a copy of both plans."""
     text = resolved_text(resolved)

@@ -60,7 +60,7 @@ _CLOSER: Mapping[str, Any] = {
 }
 
 
-def shape_error(kind: type, content: Mapping[str, Any]) -> str | None:
+def shape_error(kind: type, content: Mapping[str, object]) -> str | None:
     """Return what is wrong with a manifest's fields, in one line; None where nothing is.
 
     Parameters

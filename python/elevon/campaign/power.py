@@ -21,7 +21,7 @@ def power_rows(
     blocks: npt.NDArray[np.int64],
     names: Sequence[str],
     place: str,
-) -> list[dict[str, Any]]:
+) -> list[dict[str, object]]:
     """Return the power of each effect of interest.
 
     The model has a mean, the blocks, every factor and the interactions of interest; the effect is

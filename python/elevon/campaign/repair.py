@@ -23,6 +23,7 @@ from elevon.campaign.estimate import Cost
 from elevon.campaign.folder import (
     CampaignWork,
     describe_anew,
+    drop_log,
     finish,
     new_manifest,
     stage_tables,
@@ -213,6 +214,8 @@ def _write(survey: _Survey, work: CampaignWork) -> None:
     if running and work.missing and _log_differs(work):
         work.log.rewrite()
         survey.done.append(f"{LOG}: rebuilt, {len(work.log.items)} block(s) are whole")
+    if not (running or work.missing) and drop_log(folder):
+        survey.done.append(f"{LOG}: removed, {MANIFEST} describes what it lists")
 
 
 def _write_tables(work: CampaignWork, plan: str, damaged: list[str]) -> None:

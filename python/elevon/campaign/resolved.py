@@ -167,7 +167,7 @@ class Resolved:
         }
         return replace(template, core={**template.core, **changed})
 
-    def structure(self, number: int) -> tuple[Any, ...]:
+    def structure(self, number: int) -> tuple[object, ...]:
         """Return what decides how a run is prepared, apart from numbers that are only put in."""
         key: list[Any] = [int(self.index.variant[number])]
         for column in self.columns:

@@ -20,7 +20,7 @@ def seal(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def packed(content: Mapping[str, Any]) -> str:
+def packed(content: Mapping[str, object]) -> str:
     """Return JSON content as one compressed text with its checksum."""
     text = json.dumps({"check": seal(content), "content": content}, sort_keys=True)
     return base64.b85encode(zlib.compress(text.encode(), 9)).decode("ascii")

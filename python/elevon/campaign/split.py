@@ -82,7 +82,7 @@ def split_index(resolved: Resolved, about: Mapping[str, Any], place: str = "spli
     resolved.split = dict(about)
 
 
-def leaks(groups: Sequence[Any], split: Sequence[str]) -> list[Any]:
+def leaks(groups: Sequence[object], split: Sequence[str]) -> list[object]:
     """Return the groups (units or draws) whose runs stand in more than one part."""
     first: dict[Any, str] = {}
     distinct: dict[Any, None] = {}

@@ -20,7 +20,7 @@ __all__ = ["verify"]
 
 
 def verify(
-    folder: str | os.PathLike[str], progress: Callable[[float], Any] | None = None
+    folder: str | os.PathLike[str], progress: Callable[[float], object] | None = None
 ) -> list[Check]:
     """Check a data set; every value is a count of what is wrong, its limit 0.
 

@@ -11,7 +11,12 @@ from collections.abc import Sequence
 __all__ = ["main"]
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(
+    argv: Sequence[str] | None = None,
+    *,
+    module: str = "elevon.cli.runner",
+    program: str = "elevon",
+) -> int:
     """Run the command line and return its exit code.
 
     Parameters
@@ -19,6 +24,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv : sequence of str, optional
         Arguments after the program's name; by default those of the process, which then is taken
         to end with the command.
+    module, program : str
+        Where the typer application ``app`` is, and how it is called; by default Elevon's own.
 
     Returns
     -------
@@ -31,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             from elevon.cli.runner import run
 
-            code = run(argv)
+            code = run(argv, module, program)
         except KeyboardInterrupt:  # before the command began
             interrupt.ignore()
             import sys

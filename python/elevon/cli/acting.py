@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -39,7 +39,7 @@ def chosen(record: Acting, fidelity: str | None, not_modelled: bool) -> bool:
     return fidelity is None or fidelity in record.fidelities
 
 
-def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, Any]:
+def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, object]:
     """Drives under which a fault of an actuator acts, and where it rests with the reasons."""
     from elevon.simulate.own_faults import resting, shown_drives
 

@@ -7,20 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli import completion, interrupt
-from elevon.cli.common import (
-    ActuatorOption,
-    FaultOption,
-    FidelityOption,
-    ForceOption,
-    JsonOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    read_actuator,
-)
+from elevon.cli import common, completion, interrupt
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
@@ -39,7 +28,7 @@ def _bench() -> None:
 
 
 @app.command("list")
-def list_procedures(*, json: JsonOption = False) -> None:
+def list_procedures(*, json: common.JsonOption = False) -> None:
     """List the procedures that come with the package."""
     from elevon.bench.procedure import load_procedure, procedure_names
 
@@ -66,41 +55,39 @@ def run(
         ),
     ],
     *,
-    actuator: ActuatorOption,
+    actuator: common.ActuatorOption,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the logs.")],
-    fault: FaultOption = None,
-    settings: SetOption = None,
-    seed: SeedOption = 0,
-    fidelity: FidelityOption = "high",
+    fault: common.FaultOption = None,
+    settings: common.SetOption = None,
+    seed: common.SeedOption = 0,
+    fidelity: common.FidelityOption = "high",
     current: Annotated[str, typer.Option(help="Convention of the currents: rms or peak.")] = "rms",
     shaft: Annotated[str, typer.Option(help="Shaft of the encoder column: fast or slow.")] = "fast",
     truth: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the hidden values (JSON).")
     ] = None,
-    force: ForceOption = False,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
+    force: common.ForceOption = False,
+    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
+    json: common.JsonOption = False,
 ) -> None:
     """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
     from elevon.bench.procedure import load_procedure
-    from elevon.bench.run import run_procedure
-    from elevon.faults import Fault
+    from elevon.doors import bench
     from elevon.logs.formats.drive import DriveFormat
 
     procedure_document = load_procedure(procedure)
-    loaded = read_actuator(actuator, settings)
+    loaded = common.read_actuator(actuator, settings)
     ratio = loaded.parameters.value("gear.ratio") if "gear.ratio" in loaded.parameters else 1.0
     layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
-    faults = [Fault.parse(text) for text in fault or ()]
     with (
         interrupt.telling(lambda: _story(out, procedure_document, force=force)),
         progress_bar(f"bench: {procedure_document.name}") as advance,
     ):
-        result = run_procedure(
+        result = bench(
             procedure_document,
             loaded,
             out,
-            faults=faults,
+            faults=fault or (),
             seed=seed,
             fidelity=fidelity,
             layout=layout,
@@ -109,7 +96,7 @@ def run(
             progress=advance,
         )
     if json:
-        print_json(result.to_dict())
+        print_json(result.to_dict(stored=False))
         return
     rows = [
         (
@@ -120,8 +107,8 @@ def run(
         )
         for log in result.logs
     ]
+    answer(result.headline)
     print_table(("log", "status", "", f"files in {out}"), rows)
-    say(f"{result.sim_s:g} s simulated in {result.wall_s:.1f} s")
 
 
 def _story(out: Path, procedure: Procedure, *, force: bool) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.common import ForceOption, JsonOption, check_outputs
-from elevon.cli.output import print_json, print_table, progress_bar
+from elevon.cli.output import answer, print_json, print_table, progress_bar
 
 __all__ = ["add_to"]
 
@@ -37,25 +37,22 @@ def effects(
     json: JsonOption = False,
 ) -> int:
     """Say which factors move a response, and by how much: main effects and interactions."""
-    from elevon.analysis import effects_of, read_response
-    from elevon.analysis.effects import EQUAL_REPEATS
-    from elevon.campaign import load_campaign
+    from elevon.analysis.effects_page import EQUAL_REPEATS
+    from elevon.doors import effects as run
 
     check_outputs([report], force=force)
-    effects = effects_of(read_response(load_campaign(folder), response), level=level)
+    effects = run(folder, response, level=level)
     if report is not None:
-        from elevon.analysis.effects_page import effects_report
-
-        effects_report(effects, str(folder)).save(report, force=force)
+        effects.report().save(report, force=force)
     if json:
-        print_json({"status": "ok", **effects.to_dict()})
+        print_json(effects.to_dict(stored=False))
         return 0
     rows = [
         [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)]
         for t in effects.terms
     ]
-    title = f"{effects.response} [{effects.unit}], {effects.runs} runs, {effects.method}"
-    print_table(("term", "factors", "effect", "interval", "aliased with"), rows, title=title)
+    answer(effects.headline, f"by {effects.method}")
+    print_table(("term", "factors", "effect", "interval", "aliased with"), rows)
     for text, names in (
         ("confounded with the blocks", effects.blocked),
         ("left out, partly aliased", effects.partial),
@@ -119,12 +116,13 @@ def surrogate(
             progress=advance,
         )
     if json:
-        print_json({"status": "ok", **result.to_dict()})
+        print_json(result.to_dict(stored=False))
         return 0
     rows = [
         [v.name, v.high, v.low, f"{v.mean:.3g}", f"{v.interval[0]:.3g} to {v.interval[1]:.3g}"]
         for v in result.variants
     ]
+    answer(result.headline)
     title = f"{response}: error on held-out high runs over the response's standard deviation"
     print_table(("surrogate", "high runs", "low runs", "error", "interval"), rows, title=title)
     if result.gain is not None and result.gain_interval is not None:

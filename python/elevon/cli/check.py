@@ -9,7 +9,7 @@ import typer
 
 from elevon.cli import completion
 from elevon.cli.common import JsonOption
-from elevon.cli.output import print_json, print_table, say
+from elevon.cli.output import answer, print_json, print_table
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -33,7 +33,7 @@ def check(
     document = read_toml(file)  # a file that cannot be read is bad usage, not a finding
     # A set has groups of the same names: load.mass.
     top_keys = {"name", "base", "wiring"} & document.data.keys()
-    words = {"duration", "command", "load", "supply", "initial"} & document.data.keys()
+    words = {"duration", "command", "load", "supply", "ambient", "initial"} & document.data.keys()
     scenario = bool(words) and not top_keys
     rows = _of_scenario(file, actuator) if scenario else _of_set(file)
     failed = any(row["severity"] == "error" for row in rows)
@@ -47,10 +47,10 @@ def check(
             }
         )
         return 1 if failed else 0
+    errors = sum(row["severity"] == "error" for row in rows)
+    answer(f"{file}: {errors} errors, {len(rows) - errors} warnings")
     if rows:
         print_table(("severity", "finding"), [(row["severity"], row["message"]) for row in rows])
-    errors = sum(row["severity"] == "error" for row in rows)
-    say(f"{file}: {errors} errors, {len(rows) - errors} warnings")
     return 1 if failed else 0
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elevon.cli import completion
-from elevon.cli.output import say
+from elevon.cli.output import say, show_details
 from elevon.errors import ElevonWarning, InputError
 from elevon.files import check_output
 
@@ -104,6 +104,10 @@ StrictOption = Annotated[
         callback=_strict,
         help="What is set where it cannot act, and every other warning, is an error.",
     ),
+]
+DetailsOption = Annotated[
+    bool,
+    typer.Option("--details", callback=show_details, help="Long lists of the answer whole."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 

@@ -7,19 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorArgument,
-    FaultOption,
-    ForceOption,
-    JsonOption,
-    ScenarioOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -30,11 +19,11 @@ app = typer.Typer(rich_markup_mode=None)
 
 @app.command()
 def compare(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
-    scenario: ScenarioOption = None,
-    settings: SetOption = None,
-    fault: FaultOption = None,
+    scenario: common.ScenarioOption = None,
+    settings: common.SetOption = None,
+    fault: common.FaultOption = None,
     after: Annotated[
         float | None, typer.Option(min=0.0, help="Left out before [s]; default as the set says.")
     ] = None,
@@ -49,17 +38,16 @@ def compare(
     faults_table: Annotated[
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
     ] = False,
-    seed: SeedOption = 0,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
+    seed: common.SeedOption = 0,
+    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
+    json: common.JsonOption = False,
     out: Annotated[Path | None, typer.Option(help="Folder for report.html.")] = None,
-    force: ForceOption = False,
+    force: common.ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> int:
     """Run one scenario at high and at low fidelity; default: the one that the set says."""
-    from elevon.compare import compare as run
     from elevon.compare import default_scenario, default_start
-    from elevon.compare_loads import compare_loads
+    from elevon.doors import compare as run
     from elevon.errors import InputError
     from elevon.scenario import Scenario
 
@@ -67,34 +55,20 @@ def compare(
         raise InputError("--load needs --loads")
 
     page = None if out is None else out / "report.html"
-    check_outputs([page], force=force)
-    model = read_actuator(actuator, settings)
+    common.check_outputs([page], force=force)
+    model = common.read_actuator(actuator, settings)
     by_default = scenario is None
     run_scenario = default_scenario(model) if scenario is None else Scenario.load(scenario)
     run_scenario = run_scenario.with_faults(fault or [])
     start = default_start(model, run_scenario, default=by_default) if after is None else after
     if faults_table:
         return _faults_table(model, run_scenario, start, seed, json)
-    results = {}
     with progress_bar("comparing") as advance:
-        if loads:
-            results = compare_loads(
-                model,
-                run_scenario,
-                load=load,
-                seed=seed,
-                start=start,
-                cutoff=cutoff,
-                progress=advance,
-            )
-            result = results["as given"]
-        else:
-            result = run(
-                model, run_scenario, seed=seed, start=start, cutoff=cutoff, progress=advance
-            )
-    values = result.to_dict()
-    if loads:
-        values["loads"] = {name: item.to_dict() for name, item in results.items()}
+        result = run(
+            model, run_scenario, loads=loads, load=load, seed=seed, start=start, cutoff=cutoff,
+            progress=advance,
+        )  # fmt: skip
+    values = result.to_dict(stored=False)
     if page is not None:
         from elevon.reproduce.compare_page import compare_report
 
@@ -102,12 +76,13 @@ def compare(
     if json:
         print_json(values)
     else:
+        answer(result.headline)
         _print(values)
     return 0
 
 
 def _print(values: dict[str, Any]) -> None:
-    runs = values.get("loads", {"": values})
+    runs = values["loads"] or {"": values}
     rows = [
         [
             "output position",
@@ -125,7 +100,7 @@ def _print(values: dict[str, Any]) -> None:
         ["speed-up", *(f"{r['speed_up']:.0f} times the switching model" for r in runs.values())],
     ]
     print_table(["RMS of low less high", *runs], rows)
-    say(f"after {values['start_s']:g} s; {values['filter']}")
+    answer(f"after {values['start_s']:g} s; {values['filter']}")
 
 
 def _faults_table(
@@ -139,6 +114,8 @@ def _faults_table(
     if as_json:
         print_json(values)
         return 0
+    both = sum(row.verdict == "seen by both" for row in rows)
+    answer(f"{model.name}: {both} of {len(rows)} faults are seen by both models")
     table = [
         [row.fault, row.feature, f"{row.high:+.4g}", f"{row.low:+.4g}", f"{row.floor:.2g}",
          f"{row.ratio:+.2f}", row.verdict]

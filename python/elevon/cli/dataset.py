@@ -10,7 +10,7 @@ import typer
 from elevon.cli import dataset_make
 from elevon.cli.common import ForceOption, JsonOption
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 
 app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 dataset_make.add_to(app)
@@ -54,6 +54,8 @@ def verify(folder: FolderArgument, *, json: JsonOption = False) -> int:
         status = "pass" if passed else "fail"
         print_json({"status": status, "checks": [check.to_dict() for check in checks]})
     else:
+        wrong = sum(not c.passed for c in checks)
+        answer(f"{folder}: {f'{wrong} of {len(checks)} checks fail' if wrong else 'whole'}")
         rows = [["pass" if c.passed else "FAIL", f"{c.value:.0f}", c.name] for c in checks]
         print_table(["", "count", "what is wrong"], rows)
     if not passed:

@@ -10,7 +10,7 @@ import typer
 
 from elevon.cli import interrupt
 from elevon.cli.common import ForceOption, JsonOption, SeedOption
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
     from elevon.demo.life.results import LifeDemo
@@ -64,7 +64,7 @@ def demo(
 def _print_life(result: LifeDemo) -> None:
     from elevon.demo.life.page import lead
 
-    say(lead(result))
+    answer(lead(result))
     values = result.to_dict()
     rows = [
         (f"{r['usage']:.0f}", " + ".join(r["faults"]) or r["status"], f"{r['rul']:.0f}",
@@ -73,7 +73,8 @@ def _print_life(result: LifeDemo) -> None:
     ]  # fmt: skip
     print_table(("flights", "diagnosis", "remain", "90 %", "truth"), rows)
     _print_steps(values["steps"], result.seconds)
-    _print_checks(result.checks, result.folder)
+    _print_checks(result.checks)
+    say(f"report: {result.folder / 'report.html'}")
 
 
 def _bench(out: Path, seed: int, *, force: bool, as_json: bool) -> int:
@@ -118,11 +119,12 @@ def _row(row: dict[str, Any], result: Demo) -> tuple[str, ...]:
 
 
 def _print(result: Demo) -> None:
+    _print_checks(result.checks)
     rows = [_row(row, result) for row in result.rows()]
     columns = ("parameter", "before", "hidden truth", "estimate", "90 % interval", "unit")
     print_table(columns, rows, title="hidden values recovered from three logs")
     _print_steps([step.to_dict() for step in result.steps], result.seconds)
-    _print_checks(result.checks, result.folder)
+    say(f"report: {result.folder / 'report.html'}")
 
 
 def _print_steps(steps: Sequence[Mapping[str, Any]], seconds: float) -> None:
@@ -130,9 +132,8 @@ def _print_steps(steps: Sequence[Mapping[str, Any]], seconds: float) -> None:
     print_table(("step", "s", ""), [*rows, ("all", f"{seconds:.1f}", "")])
 
 
-def _print_checks(checks: Sequence[Check], folder: Path) -> None:
+def _print_checks(checks: Sequence[Check]) -> None:
     failed = [check for check in checks if not check.passed]
+    answer(f"{len(checks) - len(failed)} of {len(checks)} checks passed")
     for check in failed:
-        say(f"failed: {check.name}: {check.value:.4g} {check.unit}, limit {check.limit:.4g}")
-    say(f"{len(checks) - len(failed)} of {len(checks)} checks passed")
-    say(f"report: {folder / 'report.html'}")
+        answer(f"failed: {check.name}: {check.value:.4g} {check.unit}, limit {check.limit:.4g}")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table
+from elevon.cli.output import answer, print_json, print_table
 from elevon.units import parse_quantity
 
 app = typer.Typer(
@@ -111,6 +111,8 @@ def _row(design: Any) -> dict[str, Any]:
 
 
 def _show(chosen: Any, others: list[Any], dx: float) -> None:
+    verdict = "holds" if chosen.feasible else "does not hold"
+    answer(f"The spring {verdict}: safety {chosen.safety:.3g}; {len(others)} other designs do")
     rows = [(name.replace("_", " "), _text(value)) for name, value in _row(chosen).items()]
     rows.append((f"radial force at {1e3 * dx:g} mm, N", _text(chosen.radial_force(dx))))
     print_table(("quantity", "value"), rows, title="Spring of the load module")

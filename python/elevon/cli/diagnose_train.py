@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.common import ForceOption, JsonOption, SeedOption, check_outputs, read_actuator
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -36,7 +36,7 @@ def diagnose_train(
     json: JsonOption = False,
 ) -> None:
     """Simulate drawn units on the bench's tests, train, and write the surrogate."""
-    from elevon.diagnose.surrogate.training import trained
+    from elevon.training.training import trained
 
     check_outputs([out], force=force)
     with progress_bar("runs and training") as advance:
@@ -55,7 +55,7 @@ def diagnose_train(
     if json:
         print_json({"file": str(path), "bytes": size, **result.report})
         return
-    say(f"{path}: {size / 1000:.0f} kB")
+    answer(f"trained: {path}, {size / 1000:.0f} kB")
     _print(result.report)
 
 

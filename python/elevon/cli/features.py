@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from elevon.cli.common import JsonOption
-from elevon.cli.output import print_json, print_table, say
+from elevon.cli.output import answer, print_json, print_table, say
 from elevon.number_text import quantity_text
 
 app = typer.Typer(rich_markup_mode=None)
@@ -53,6 +53,7 @@ def features(
         (name, *quantity_text(value, result.units[name], 6))
         for name, value in result.values.items()
     ]
+    answer(f"{log}: {len(cells)} features at {result.rate:g} Hz")
     print_table(("feature", "value", "unit"), cells)
     return 0
 

@@ -7,18 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorArgument,
-    FaultOption,
-    ForceOption,
-    JsonOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,28 +20,28 @@ app = typer.Typer(rich_markup_mode=None)
 
 @app.command()
 def fit_low(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
-    settings: SetOption = None,
+    settings: common.SetOption = None,
     scenario: Annotated[
         list[Path] | None,
         typer.Option(metavar="FILE", help="Scenario to fit to instead of the stated list."),
     ] = None,
-    fault: FaultOption = None,
+    fault: common.FaultOption = None,
     out: Annotated[Path | None, typer.Option(metavar="SET.toml", help="Write the set.")] = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report.")] = None,
-    seed: SeedOption = 0,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
-    force: ForceOption = False,
+    seed: common.SeedOption = 0,
+    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
+    json: common.JsonOption = False,
+    force: common.ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> int:
     """Fit the reduced-order model's free numbers to the switching model over scenarios, faults."""
     from elevon.lowfit import fit_low as run
     from elevon.lowfit import write_fit
 
-    check_outputs([out, report], force=force)
-    model = read_actuator(actuator, settings)
+    common.check_outputs([out, report], force=force)
+    model = common.read_actuator(actuator, settings)
     cases = _cases(model, scenario, fault)
     with progress_bar("switching model, then the fit") as advance:
         fit = run(model, cases, seed=seed, progress=advance)
@@ -86,6 +76,10 @@ def _print(fit: LowFit) -> None:
         for row in values["fitted"]
     ]
     fitted += [[row["path"], "", "kept", row["reason"]] for row in values["kept"]]
+    answer(
+        f"{len(values['fitted'])} numbers fitted over {len(values['cases'])} cases, "
+        f"{len(values['kept'])} kept"
+    )
     print_table(["number", "old", "new", "deviation"], fitted)
     rows = [
         [row["name"], *(f"{100 * row[when][n]:.2f}" for n in row["before"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.common import without_companions
-from elevon.cli.output import print_json, print_table, say
+from elevon.cli.output import answer, print_json, print_table, say
 from elevon.errors import InputError
 from elevon.units import shown_unit, to_display
 
@@ -236,5 +236,6 @@ def _cranfield(logs: list[Path], out: Path, *, force: bool, json: bool) -> int:
         print_json({"status": "ok", "logs": rows})
     else:
         cells = [(r["recording"], r["samples"], r["load_kgf"], r["run"]) for r in rows]
+        answer(f"{len(cells)} recordings in {out}")
         print_table(("recording", "samples", "load kgf", "run"), cells)
     return 0

@@ -6,15 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli import completion
+from elevon.cli import common, completion
 from elevon.cli.acting import by_drive, check, chosen
-from elevon.cli.common import (
-    ActuatorArgument,
-    FidelityOption,
-    JsonOption,
-    NotModelledOption,
-    OnlyFidelityOption,
-)
 from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table
 
@@ -30,7 +23,7 @@ app = typer.Typer(
 
 
 @app.command()
-def actuators(*, json: JsonOption = False) -> None:
+def actuators(*, json: common.JsonOption = False) -> None:
     """List the actuators that can be named: the shipped ones and those in ELEVON_ACTUATORS."""
     from elevon.documents import read_toml
     from elevon.parameters.find import set_paths
@@ -53,7 +46,7 @@ def procedures(
             autocompletion=completion.actuators,
         ),
     ] = None,
-    json: JsonOption = False,
+    json: common.JsonOption = False,
 ) -> None:
     """List the virtual bench's procedures, with the stand each is written for."""
     from elevon.actuator import Actuator
@@ -71,7 +64,10 @@ def procedures(
 
 @app.command()
 def signals(
-    actuator: ActuatorArgument, *, fidelity: FidelityOption = "high", json: JsonOption = False
+    actuator: common.ActuatorArgument,
+    *,
+    fidelity: common.FidelityOption = "high",
+    json: common.JsonOption = False,
 ) -> None:
     """List the signals of an actuator that can be recorded."""
     from elevon import _core
@@ -86,11 +82,11 @@ def signals(
 
 @app.command()
 def parameters(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
-    fidelity: OnlyFidelityOption = None,
-    not_modelled: NotModelledOption = False,
-    json: JsonOption = False,
+    fidelity: common.OnlyFidelityOption = None,
+    not_modelled: common.NotModelledOption = False,
+    json: common.JsonOption = False,
 ) -> None:
     """List the parameters an actuator's model has: unit, range, meaning, where each acts."""
     from elevon.actuator import Actuator
@@ -129,9 +125,9 @@ def faults(
         ),
     ] = None,
     *,
-    fidelity: OnlyFidelityOption = None,
-    not_modelled: NotModelledOption = False,
-    json: JsonOption = False,
+    fidelity: common.OnlyFidelityOption = None,
+    not_modelled: common.NotModelledOption = False,
+    json: common.JsonOption = False,
 ) -> None:
     """List the fault catalogue: kind, places, unit, range, where each acts, effect, source.
 
@@ -178,7 +174,7 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
 
 
 @app.command()
-def waveforms(*, json: JsonOption = False) -> None:
+def waveforms(*, json: common.JsonOption = False) -> None:
     """List the waveforms of commands and loads with their parameters (* = must be given)."""
     from elevon.waveforms import wave_records
 
@@ -213,8 +209,8 @@ def features(
         ),
     ] = None,
     *,
-    fidelity: FidelityOption = "high",
-    json: JsonOption = False,
+    fidelity: common.FidelityOption = "high",
+    json: common.JsonOption = False,
 ) -> None:
     """List the features of a motion: unit, roles they need, definition.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.common import ActuatorOption, ForceOption, JsonOption
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -203,6 +203,7 @@ def _print(table: LoadTable, linear: bool, json: bool) -> None:
             }
         )
         return
+    answer(f"load {low:.5g} to {high:.5g} {force} over {table.time[-1]:g} s")
     print_table(
         ["what", "value"],
         [

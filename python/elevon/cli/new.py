@@ -9,7 +9,7 @@ import typer
 
 from elevon.cli import completion
 from elevon.cli.common import ForceOption, JsonOption
-from elevon.cli.output import print_json, say
+from elevon.cli.output import answer, print_json
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -40,4 +40,4 @@ def new(
     if json:
         print_json({"status": "ok", "file": str(written), "base": base})
         return
-    say(f"wrote {written}: change what differs, then: elevon check {written}")
+    answer(f"wrote {written}: change what differs, then: elevon check {written}")

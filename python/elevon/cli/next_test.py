@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elevon.cli.common import ActuatorOption, JsonOption, SetOption, read_actuator
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from elevon.diagnose.nexttest import NextTest
+    from elevon.nexttest import NextTest
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -28,35 +28,27 @@ def next_test(
     json: JsonOption = False,
 ) -> None:
     """Propose the bench's test with the largest expected information on what is ambiguous."""
-    from elevon.diagnose.nexttest import next_test as choose
-    from elevon.diagnose.nexttest.belief import read_result
+    from elevon.nexttest.door import next_test as choose
 
     model = read_actuator(actuator, settings)
-    results = [read_result(path) for path in so_far or []]
     with progress_bar("weighing tests") as advance:
-        result = choose(model, results, progress=advance)
+        result = choose(model, so_far or [], progress=advance)
     if json:
-        print_json(result.to_dict())
+        print_json(result.to_dict(stored=False))
         return
     _print(result)
 
 
 def _print(result: NextTest) -> None:
-    best = result.tests[0]
-    values = ", ".join(f"{name} {value}" for name, value in best.profile.parameters.items())
-    say(
-        f"Run {best.profile.name} ({values}): {best.information:.2g} of the "
-        f"{result.belief.entropy:.2g} bit still unknown are expected from it."
-    )
+    answer(result.headline)
     print_table(
         ("test", "expected [bit]", "healthy log at hand"),
-        [
-            (t.profile.name, f"{t.information:.3f}", "yes" if t.profile.standard else "no")
-            for t in result.tests
-        ],
+        [(t.name, f"{t.information:.3f}", "yes" if t.standard else "no") for t in result.tests],
     )
-    ranked = sorted(result.belief.possible, key=lambda p: -p.weight)
     print_table(
         ("still possible", "probability"),
-        [(" and ".join(p.keys) or "healthy", f"{p.weight:.3f}") for p in ranked[:10]],
+        [
+            (" and ".join(p.faults) or "healthy", f"{p.probability:.3f}")
+            for p in result.possible[:10]
+        ],
     )

@@ -1,4 +1,4 @@
-"""What commands print: one JSON object or a table on stdout, messages and progress on stderr."""
+"""What commands print: on stdout one JSON object, or an answer and its tables; else on stderr."""
 
 from __future__ import annotations
 
@@ -8,32 +8,17 @@ import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from elevon.cli import interrupt
-
-
-def plain(value: Any) -> Any:
-    """Turn numpy scalars and arrays, paths, mappings and sequences into JSON's own types.
-
-    A number that is not finite becomes None: JSON has no way to write it.
-    """
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if value - value == 0.0 else None
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in value]
-    return str(value)
+from elevon.plain import plain
+from elevon.results import finite
 
 
 def print_json(value: Mapping[str, Any]) -> None:
     """Write one JSON object, and nothing else, on stdout; with it the command has answered."""
-    text = json.dumps(plain(value), allow_nan=False, indent=2) + "\n"
+    text = json.dumps(finite(plain(value)), allow_nan=False, indent=2) + "\n"
     interrupt.check()
     sys.stdout.write(text)
     sys.stdout.flush()
@@ -68,6 +53,36 @@ def print_table(
     if terminal and "NO_COLOR" not in os.environ:
         lines[0] = f"\033[1m{lines[0]}\033[0m"
     sys.stdout.write("\n".join([*([title] if title else []), *lines]) + "\n")
+
+
+@dataclass
+class _Lists:
+    """Whether long lists are printed whole: ``--details``."""
+
+    whole: bool = False
+
+
+_lists = _Lists()
+_FEW = 3  # lines of a list that are printed without --details
+
+
+def show_details(value: bool) -> bool:
+    """Take ``--details`` for the rest of this command."""
+    _lists.whole = value
+    return value
+
+
+def answer(*lines: str) -> None:
+    """Write the answer on stdout, its first line first; tables follow it."""
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
+
+
+def listed(lines: Sequence[str]) -> None:
+    """Write a list of an answer on stdout: whole with ``--details``, else its first lines."""
+    few = lines if _lists.whole else lines[:_FEW]
+    answer(*few)
+    if len(few) < len(lines):
+        answer(f"and {len(lines) - len(few)} more: --details")
 
 
 def say(message: str) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from elevon.cli.common import (
     ActuatorOption,
+    DetailsOption,
     ForceOption,
     JsonOption,
     SeedOption,
@@ -17,8 +18,7 @@ from elevon.cli.common import (
     check_outputs,
     read_actuator,
 )
-from elevon.cli.output import print_json, print_table, progress_bar, say
-from elevon.errors import InputError
+from elevon.cli.output import answer, listed, print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
@@ -48,58 +48,42 @@ def predict(
     report: Annotated[Path | None, typer.Option("--report", help="HTML page to write.")] = None,
     seed: SeedOption = 0,
     strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
+    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
     force: ForceOption = False,
 ) -> int:
     """Predict the remaining useful life of the unit whose inspections are in HISTORY."""
-    from elevon.prognose.history import diagnosed, read_history
-    from elevon.prognose.mission import Mission
-    from elevon.prognose.predict import predict as run
-    from elevon.prognose.respond import respond
+    from elevon.prognose.door import predict as run
 
     check_outputs([report], force=force)
-    if any(not n >= 0.0 for n in survive or ()):
-        raise InputError("--survive: N must be 0 or more")
     model = read_actuator(actuator, settings)
-    flown = Mission.load(mission)
-    entries = read_history(history, unit=flown.unit)
     with progress_bar("model runs") as advance:
-        tables = respond(model, flown, snapshots=snapshots, progress=advance)
-    if any(entry.diagnosis is None for entry in entries.entries):
-        with progress_bar("diagnoses") as advance:
-            entries = diagnosed(entries, model, progress=advance)
-    seen = entries.inspections(tables.laws, tables.units_by_name)
-    result = run(
-        seen, model, flown, response=tables, particles=particles, seed=seed, serial=entries.serial
-    )
+        result = run(
+            history, model, mission, survive=survive or (), particles=particles,
+            snapshots=snapshots, seed=seed, progress=advance,
+        )  # fmt: skip
     if report is not None:
-        from elevon.prognose.page import prognosis_page
-
-        page = prognosis_page(result, seen, tables.laws, actuator=model.name)
-        say(f"report: {page.save(report, force=force)}")
+        say(f"report: {result.report().save(report, force=force)}")
     if json:
-        print_json(result.to_dict(survive or ()))
+        print_json(result.to_dict(stored=False))
         return 0
-    _print(result, survive or ())
+    _print(result)
     return 0
 
 
-def _print(result: Prognosis, horizons: list[float] | tuple[float, ...]) -> None:
-    from elevon.prognose.answer import survival
+def _print(result: Prognosis) -> None:
     from elevon.prognose.figures import severity_unit
-    from elevon.prognose.page import sentence
     from elevon.units import to_display
 
-    say(sentence(result))
+    answer(result.headline)
     print_table(
         (f"next N {result.unit}", "probability of surviving"),
-        [(f"{n:g}", f"{p:.3f}") for n, p in survival(result, horizons)],
+        [(f"{n:g}", f"{p:.3f}") for n, p in result.p_survive],
     )
     rows = []
     for item in result.reserve:
-        unit = severity_unit(item["unit"])
-        now, end = (f"{to_display(item[key], unit):.4g}" for key in ("value", "threshold"))
-        rows.append((item["name"], now, end, unit, f"{result.first[item['name']]:.3f}"))
+        unit = severity_unit(item.unit)
+        now, end = (f"{to_display(getattr(item, key), unit):.4g}" for key in ("value", "threshold"))
+        rows.append((item.name, now, end, unit, f"{result.first[item.name]:.3f}"))
     print_table(("requirement", "now", "life ends at", "unit", "fails first"), rows)
-    for text in result.findings:
-        say(text)
+    listed(result.findings)

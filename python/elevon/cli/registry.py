@@ -64,5 +64,8 @@ COMMANDS: dict[str, CommandEntry] = {
     "demo": CommandEntry(
         "elevon.cli.demo", "Let a unit wear, diagnose it, predict its end; one report."
     ),
+    "safety": CommandEntry(
+        "elevon.cli.safety", "Run a control unit under many failures; list the hazards left."
+    ),
     "reproduce": CommandEntry("elevon.cli.reproduce", "Recompute a published table or figure."),
 }

@@ -7,29 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorArgument,
-    FidelityOption,
-    ForceOption,
-    JsonOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.response import FrequencyResponse, LinearModel, LoopResponse
+    from elevon.response import FrequencyResponse, LoopResponse
 
 app = typer.Typer(rich_markup_mode=None)
 
 
 @app.command()
 def response(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
     low: Annotated[
         str | None, typer.Option("--from", help="Lowest frequency; by default 0.5 Hz.")
@@ -55,41 +44,54 @@ def response(
     load: Annotated[str, typer.Option(help="Constant load on the output side.")] = "0",
     method: Annotated[str | None, typer.Option(help="multisine (default) or sweep.")] = None,
     realisations: Annotated[int, typer.Option(min=1, help="Independent inputs.")] = 6,
-    fidelity: FidelityOption = "high",
+    fidelity: common.FidelityOption = "high",
     linear: Annotated[
-        bool, typer.Option("--linear", help="Add the linear model of the low fidelity.")
+        bool,
+        typer.Option(
+            "--linear",
+            help="Add the linear model of the low fidelity, and the band in which it holds.",
+        ),
     ] = False,
-    settings: SetOption = None,
+    settings: common.SetOption = None,
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Bode plot: .png, .svg or .pdf.")
     ] = None,
-    seed: SeedOption = 0,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    force: ForceOption = False,
-    json: JsonOption = False,
+    seed: common.SeedOption = 0,
+    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
+    force: common.ForceOption = False,
+    json: common.JsonOption = False,
 ) -> None:
     """Measure gain, phase and coherence from the command to a signal by simulation.
 
     With ``--loop`` the open loop instead: gain, phase and disk margin with intervals.
     """
+    from elevon.doors import response as run
+    from elevon.response import LoopResponse
+
     _check_plot(plot, force=force)
-    loaded = read_actuator(actuator, settings)
-    common: dict[str, Any] = {
-        "bias": bias, "load": load, "realisations": realisations, "fidelity": fidelity, "seed": seed
-    }  # fmt: skip
+    loaded = common.read_actuator(actuator, settings)
     if loop is not None:
         _refuse({"--output": output, "--mode": mode, "--method": method, "--linear": linear})
-        margins = _loop(loaded, loop, (low, high, amplitude), common)
-        _finish(loaded, margins, plot, {}, force=force, as_json=json)
+    with progress_bar(f"response of {loaded.name}") as advance:
+        measured = run(
+            loaded, low, high, amplitude, loop=loop, output=output or "output_position",
+            mode=mode or "position", method=method or "multisine", linear=linear, bias=bias,
+            load=load, realisations=realisations, fidelity=fidelity, seed=seed, progress=advance,
+        )  # fmt: skip
+    if plot is not None:
+        _save(measured, plot, force=force)
+    if json:
+        data = measured.to_dict(stored=False)
+        print_json({k: v for k, v in data.items() if k not in _OPTIONAL or v is not None})
         return
-    mode, output = mode or "position", output or "output_position"
-    measured = _response(
-        loaded, (low or "0.5 Hz", high or "20 Hz", amplitude or _usual(loaded, mode)),
-        {**common, "output": output, "mode": mode, "method": method or "multisine"},
-    )  # fmt: skip
-    model = _linear(loaded, mode, bias, load, output) if linear else None
-    extra = {} if model is None else {"linear": model}
-    _finish(loaded, measured, plot, extra, force=force, as_json=json)
+    answer(measured.headline)
+    if isinstance(measured, LoopResponse):
+        _print_loop(measured)
+    else:
+        _print(measured)
+
+
+_OPTIONAL = ("linear", "band")
 
 
 def _refuse(options: dict[str, str | bool | None]) -> None:
@@ -98,47 +100,6 @@ def _refuse(options: dict[str, str | bool | None]) -> None:
     given = [name for name, value in options.items() if value]
     if given:
         raise InputError(f"{', '.join(given)}: not with --loop, which measures its own signals")
-
-
-def _response(
-    loaded: Actuator, span: tuple[str, str, str], options: dict[str, Any]
-) -> FrequencyResponse:
-    from elevon.response import frequency_response
-
-    with progress_bar(f"response of {loaded.name}") as advance:
-        return frequency_response(loaded, *span, **options, progress=advance)
-
-
-def _loop(
-    loaded: Actuator, loop: str, span: tuple[str | None, ...], options: dict[str, Any]
-) -> LoopResponse:
-    from elevon.response import loop_response
-
-    with progress_bar(f"{loop} loop of {loaded.name}") as advance:
-        return loop_response(loaded, loop, *span, **options, progress=advance)
-
-
-def _finish(
-    loaded: Actuator,
-    measured: FrequencyResponse | LoopResponse,
-    plot: Path | None,
-    extra: dict[str, LinearModel],
-    *,
-    force: bool,
-    as_json: bool,
-) -> None:
-    """Write the plot, print the figures."""
-    from elevon.response import LoopResponse
-
-    if plot is not None:
-        _save(measured, plot, force=force)
-    if as_json:
-        more = {name: model.to_dict() for name, model in extra.items()}
-        print_json({"status": "ok", "actuator": loaded.name, **measured.to_dict(), **more})
-    elif isinstance(measured, LoopResponse):
-        _print_loop(measured)
-    else:
-        _print(measured, extra.get("linear"))
 
 
 def _print_loop(measured: LoopResponse) -> None:
@@ -157,7 +118,7 @@ def _print_loop(measured: LoopResponse) -> None:
         rows.append([name, value, *ends, unit, at])
     print_table(("margin", "value", "low", "high", "unit", "at [Hz]"), rows)
     if measured.hint:
-        say(measured.hint)
+        answer(measured.hint)
 
 
 def _check_plot(plot: Path | None, *, force: bool) -> None:
@@ -166,23 +127,7 @@ def _check_plot(plot: Path | None, *, force: bool) -> None:
 
     if plot is not None and plot.suffix.lower() not in PICTURES:
         raise unknown("ending of a plot", plot.suffix, PICTURES, str(plot))
-    check_outputs([plot], force=force)
-
-
-def _usual(actuator: Actuator, mode: str) -> str:
-    """Return a command small against the stroke: one that backlash and friction still shape."""
-    from elevon.scenario.compile import signal_units
-
-    if mode != "position":
-        return {"speed": "60 rpm", "torque": "0.5 N m"}.get(mode, "1")
-    linear = signal_units(actuator.wiring, "high")["output_position"] == "m"
-    return "1 mm" if linear else "1 deg"
-
-
-def _linear(actuator: Actuator, mode: str, bias: str, load: str, output: str) -> LinearModel:
-    from elevon.response import linearise
-
-    return linearise(actuator, outputs=[output], mode=mode, command=bias, load=load)
+    common.check_outputs([plot], force=force)
 
 
 def _save(measured: FrequencyResponse | LoopResponse, path: Path, *, force: bool) -> None:
@@ -193,7 +138,8 @@ def _save(measured: FrequencyResponse | LoopResponse, path: Path, *, force: bool
     say(f"wrote {path}")
 
 
-def _print(measured: FrequencyResponse, model: LinearModel | None) -> None:
+def _print(measured: FrequencyResponse) -> None:
+    model = measured.linear
     data: dict[str, Any] = measured.to_dict()
     columns = ("frequency [Hz]", "gain [dB]", "phase [deg]", "coherence", "gain +- [%]")
     numbers = zip(
@@ -207,10 +153,9 @@ def _print(measured: FrequencyResponse, model: LinearModel | None) -> None:
     formats = ("{:.4g}", "{:.2f}", "{:.1f}", "{:.3f}", "{:.1f}")
     rows = [[f.format(x) for f, x in zip(formats, row, strict=True)] for row in numbers]
     print_table(columns, rows)
-    for name, text in (("bandwidth_hz", "gain -3 dB"), ("lag_90_hz", "phase -90 deg")):
-        value = data[name]
-        typer.echo(f"{text}: " + ("not reached" if value is None else f"{value:.3g} Hz"))
     if model is not None:
         poles = [f"{x.real:.4g}{f'{x.imag:+.4g}j' if x.imag else ''}" for x in model.poles]
-        typer.echo(f"linear model: {model.order} states, error {model.error:.2g}")
-        typer.echo(f"poles [1/s]: {', '.join(poles)}")
+        answer(f"linear model: {model.order} states, error {model.error:.2g}")
+        answer(f"poles [1/s]: {', '.join(poles)}")
+    if measured.band is not None:
+        answer(measured.band.text)

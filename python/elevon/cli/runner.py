@@ -31,7 +31,7 @@ _ROOT_ONLY = ("install_completion", "show_completion")
 class LazyGroup(NamingGroup):
     """A group that imports a command's module only when that command is run."""
 
-    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - click's signature
+    def list_commands(self, ctx: object) -> list[str]:  # noqa: ARG002 - click's signature
         """Names of the commands of this installation, in the registry's order."""
         return [name for name, command in COMMANDS.items() if command.available]
 
@@ -83,12 +83,16 @@ def _root(
         typer.echo(context.get_help())
 
 
-def run(argv: Sequence[str] | None = None) -> int:
+def run(
+    argv: Sequence[str] | None = None,
+    module: str = "elevon.cli.runner",
+    program: str = "elevon",
+) -> int:
     """Run the command line, turning every expected failure into a message and an exit code."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     with journal() as written, _warnings_in_words():
         try:
-            code = _code(arguments)
+            code = _code(arguments, module, program)
         except (KeyboardInterrupt, Interrupted, typer.Abort):
             return _interrupted(written)
         except Exception:
@@ -100,13 +104,12 @@ def run(argv: Sequence[str] | None = None) -> int:
         return _interrupted(written) if code == interrupt.INTERRUPTED else code
 
 
-def _code(arguments: list[str]) -> int:
+def _code(arguments: list[str], module: str, program: str) -> int:
     if os.environ.get("_ELEVON_COMPLETE") == "complete_bash":
         completion.join_words()
     try:
-        outcome = typer.main.get_command(app).main(
-            args=arguments, prog_name="elevon", standalone_mode=False
-        )
+        command = typer.main.get_command(importlib.import_module(module).app)
+        outcome = command.main(args=arguments, prog_name=program, standalone_mode=False)
     except Interrupted:
         raise
     except UsageError as error:

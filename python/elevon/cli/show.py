@@ -7,17 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from elevon.cli import common
 from elevon.cli.acting import check, chosen
-from elevon.cli.common import (
-    ActuatorArgument,
-    ForceOption,
-    JsonOption,
-    NotModelledOption,
-    OnlyFidelityOption,
-    SetOption,
-    check_outputs,
-    read_actuator,
-)
 from elevon.cli.output import print_json, print_table, say
 
 app = typer.Typer(rich_markup_mode=None)
@@ -25,9 +16,9 @@ app = typer.Typer(rich_markup_mode=None)
 
 @app.command()
 def show(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
-    settings: SetOption = None,
+    settings: common.SetOption = None,
     svg: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the block diagram as SVG.")
     ] = None,
@@ -36,10 +27,10 @@ def show(
         typer.Option(metavar="FILE", help="Write the JSON Schema of its actuator files."),
     ] = None,
     notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
-    fidelity: OnlyFidelityOption = None,
-    not_modelled: NotModelledOption = False,
-    force: ForceOption = False,
-    json: JsonOption = False,
+    fidelity: common.OnlyFidelityOption = None,
+    not_modelled: common.NotModelledOption = False,
+    force: common.ForceOption = False,
+    json: common.JsonOption = False,
 ) -> None:
     """Show an actuator: block diagram, parameters with units, sources, where they act; references.
 
@@ -47,8 +38,8 @@ def show(
     """
     from elevon.diagram import diagram_svg, diagram_text, diagrams
 
-    check_outputs([svg, schema], force=force)
-    loaded = read_actuator(actuator, settings)
+    common.check_outputs([svg, schema], force=force)
+    loaded = common.read_actuator(actuator, settings)
     check(fidelity, [loaded.wiring])
     parameters = _chosen(loaded, fidelity, not_modelled)
     if svg is not None:
@@ -96,9 +87,9 @@ def _print_parameters(loaded: Any, parameters: list[Any], notes: bool) -> None:
 def _write_schema(path: Path, wiring: str, *, force: bool) -> None:
     from json import dumps
 
-    from elevon.cli.output import plain
     from elevon.files import write_text
     from elevon.parameters import json_schema
+    from elevon.plain import plain
 
     write_text(path, dumps(plain(json_schema(wiring)), indent=2) + "\n", force=force)
     say(f"wrote {path}")

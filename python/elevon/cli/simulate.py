@@ -7,22 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorArgument,
-    DurationOption,
-    FaultOption,
-    FidelityOption,
-    ForceOption,
-    JsonOption,
-    RecordOption,
-    ScenarioOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-    read_scenario,
-)
+from elevon.cli import common
 from elevon.cli.output import print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
@@ -36,14 +21,14 @@ _PLOTS = (".png", ".svg", ".pdf", ".html")
 
 @app.command()
 def simulate(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
-    scenario: ScenarioOption = None,
-    duration: DurationOption = None,
-    settings: SetOption = None,
-    fault: FaultOption = None,
-    fidelity: FidelityOption = "high",
-    record: RecordOption = None,
+    scenario: common.ScenarioOption = None,
+    duration: common.DurationOption = None,
+    settings: common.SetOption = None,
+    fault: common.FaultOption = None,
+    fidelity: common.FidelityOption = "high",
+    record: common.RecordOption = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Save the recording: .parquet, .nc, .csv or .mat."),
@@ -51,16 +36,16 @@ def simulate(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Plot it: .png, .svg, .pdf or .html.")
     ] = None,
-    seed: SeedOption = 0,
+    seed: common.SeedOption = 0,
     compare: Annotated[
         Path | None, typer.Option(metavar="REC", help="Another recording drawn over this one.")
     ] = None,
     spectra: Annotated[
         bool, typer.Option("--spectra", help="Add spectra of error, current and speed to the plot.")
     ] = False,
-    force: ForceOption = False,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
+    force: common.ForceOption = False,
+    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
+    json: common.JsonOption = False,
 ) -> None:
     """Simulate one actuator and keep what it did."""
     from elevon.recording.formats import files_of
@@ -69,8 +54,8 @@ def simulate(
 
     _check_files(out, plot, force=force)
     other = _read_other(compare, plot)
-    loaded = read_actuator(actuator, settings)
-    wanted = read_scenario(loaded, scenario, duration, fault)
+    loaded = common.read_actuator(actuator, settings)
+    wanted = common.read_scenario(loaded, scenario, duration, fault)
     if out is not None:
         _check_clocks(out, Run(loaded, wanted, seed), fidelity, record, force=force)
     with progress_bar(f"simulating {loaded.name}") as advance:
@@ -100,7 +85,7 @@ def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:
         raise unknown("ending of a plot", plot.suffix, _PLOTS, str(plot))
     if out is not None and plot is not None and out.absolute() == plot.absolute():
         raise InputError(f"{out}: --out and --plot name the same file")
-    check_outputs([out, plot], force=force)
+    common.check_outputs([out, plot], force=force)
 
 
 def _read_other(compare: Path | None, plot: Path | None) -> Recording | None:

@@ -13,12 +13,11 @@ from elevon.cli.calibrate import (
     MapOption,
     ReportOption,
     TransientOption,
-    _provenance,
-    direct_logs,
+    read,
 )
-from elevon.cli.closed_loop import read_loop_logs, read_recording, validate_closed_loop
 from elevon.cli.common import (
     ActuatorOption,
+    DetailsOption,
     ForceOption,
     JsonOption,
     SetOption,
@@ -26,7 +25,7 @@ from elevon.cli.common import (
     check_outputs,
     read_actuator,
 )
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, listed, print_json, print_table, progress_bar, say
 from elevon.number_text import quantity_text
 
 app = typer.Typer(rich_markup_mode=None)
@@ -45,37 +44,26 @@ def validate(
     settings: SetOption = None,
     report: ReportOption = None,
     strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
+    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
     json: JsonOption = False,
     force: ForceOption = False,
     date: DateOption = None,
 ) -> int:
     """Compare the model with logs, signal by signal; exit 1 where a threshold fails."""
-    from elevon.calibrate.replay import validate_replay
-    from elevon.calibrate.report import validation_report
-    from elevon.calibrate.validation import validate as run
-    from elevon.parameters.records import wirings
+    from elevon.calibrate.door import validate as run
 
     check_outputs([report], force=force)
     model = read_actuator(actuator, settings)
-    data = direct_logs(model, logs, loadcell, command, column_map)
-    if data is None and "position" not in wirings()[model.wiring]["modes"]:
-        with progress_bar("validating") as advance:
-            named = [(path.name, read_recording(path, column_map)) for path in logs]
-            result = validate_replay(
-                named, model, fidelity=fidelity, transient=transient, progress=advance
-            )
-    elif data is None:
-        result = validate_closed_loop(read_loop_logs(logs, column_map), model, transient)
-    else:
-        with progress_bar("validating") as advance:
-            result = run(data, model, fidelity=fidelity, transient=transient, progress=advance)
-            advance(1.0)
+    data = read(logs, column_map, loadcell, command)
+    with progress_bar("validating") as advance:
+        result = run(data, model, fidelity=fidelity, transient=transient, progress=advance)
+        advance(1.0)
     if report is not None:
-        page = validation_report(result, provenance=_provenance(), date=date)
-        say(f"report: {page.save(report, force=force)}")
+        say(f"report: {result.report(date=date).save(report, force=force)}")
     if json:
-        print_json(result.to_dict())
+        print_json(result.to_dict(stored=False))
     else:
+        answer(result.headline)
         rows = [
             (
                 e.log,
@@ -92,15 +80,12 @@ def validate(
         print_table(
             ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
         )
-        for name, offset in result.offsets.items():
-            say(_sensor_text(name, offset))
-        say(
+        listed([_sensor_text(name, offset) for name, offset in result.offsets.items()])
+        answer(
             "% of RMS: RMS error over the logged signal's RMS about its mean; "
-            "% of range: over its range"
+            f"% of range: over its range; after {result.transient:g} s"
         )
-        say(f"after {result.transient:g} s; {result.status}")
-    for name, text in result.notes.items():
-        say(f"{name}: {text}")
+        listed([f"{name}: {text}" for name, text in result.notes.items()])
     return 1 if result.status == "fail" else 0
 
 

@@ -37,7 +37,7 @@ def is_hdf5(path: Path) -> bool:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def opened(path: Path) -> Iterator[object]:
     """Open a file; whatever goes wrong inside, also in the library, is a clear error.
 
     Raises
@@ -56,7 +56,7 @@ def opened(path: Path) -> Iterator[Any]:
         raise FormatError(f"{path}: damaged HDF5 file: {quoted(str(error))}") from error
 
 
-def datasets(file: Any, notes: list[str]) -> Iterator[tuple[str, Any]]:
+def datasets(file: object, notes: list[str]) -> Iterator[tuple[str, object]]:
     """Yield path and dataset of everything in a file, over hard links only.
 
     Parameters

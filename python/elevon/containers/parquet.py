@@ -20,7 +20,7 @@ _LONGEST_TEXT = 40
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
+def opened(path: Path) -> Iterator[object]:
     """Open a file; whatever goes wrong inside, also in the library, is a clear error.
 
     Pages that carry a checksum are held to it.
@@ -43,7 +43,7 @@ def opened(path: Path) -> Iterator[Any]:
         raise FormatError(f"{path}: damaged Parquet file: {quoted(str(error))}") from error
 
 
-def is_numeric(kind: Any) -> bool:
+def is_numeric(kind: object) -> bool:
     """Return whether an Arrow type holds plain numbers."""
     from pyarrow import types
 

@@ -109,7 +109,7 @@ class FinishedSteps:
             return None
         try:
             return read(item.data["result"]), float(item.data["seconds"])
-        except (KeyError, TypeError, ValueError):
+        except (FormatError, KeyError, TypeError, ValueError):
             return None
 
     def save(

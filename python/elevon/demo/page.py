@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from elevon.calibrate.estimate import LEVEL
 from elevon.calibrate.validation import SIGNALS
 from elevon.calibrate.zeros import encoder_count
 from elevon.demo.bench_figure import bench_figure
 from elevon.demo.page_parameters import parameters_section
+from elevon.estimate import LEVEL
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.backlash.page import summary_figure

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.calibrate.estimate import LEVEL
+from elevon.estimate import LEVEL
 from elevon.report import ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.units import to_display

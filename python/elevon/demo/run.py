@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from elevon.calibrate.outcome import Calibration
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
-from elevon.demo.results import Backlashes, Recovered, validation_from_json, validation_to_json
+from elevon.demo.results import Backlashes
 from elevon.demo.steps import Story, Work
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
@@ -19,8 +20,9 @@ from elevon.report.checks import Check, verdict
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate import BenchLog, Validation
+    from elevon.calibrate import Validation
     from elevon.logs.importing import ImportedLog
+    from elevon.logs.log import Log
 
 __all__ = ["Demo", "demo_files", "run_demo"]
 
@@ -33,7 +35,7 @@ class Demo(Story):
 
     Attributes
     ----------
-    backlash, imported, calibration : Backlashes, list of ImportedLog, Recovered
+    backlash, imported, calibration : Backlashes, list of ImportedLog, Calibration
         Results.
     before, after : Validation
         Published and calibrated values against all logs, the held-out one among them.
@@ -43,8 +45,8 @@ class Demo(Story):
 
     backlash: Backlashes = field(init=False)
     imported: list[ImportedLog] = field(init=False)
-    logs: list[BenchLog] = field(init=False)
-    calibration: Recovered = field(init=False)
+    logs: list[Log] = field(init=False)
+    calibration: Calibration = field(init=False)
     before: Validation = field(init=False)
     after: Validation = field(init=False)
     truth: dict[str, float] = field(default_factory=dict)
@@ -188,7 +190,7 @@ def _backlash(demo: Demo, progress: Progress | None) -> None:
 
     def work() -> Backlashes:
         result = reproduce_backlash(progress=progress)
-        backlash_report(result).save(page, force=True)
+        backlash_report(result).save(page, force=True, links=False)
         return Backlashes.of(result)
 
     demo.backlash = demo.resumed(
@@ -221,14 +223,15 @@ def _bench(demo: Demo, progress: Progress | None) -> list[Path]:
 
 
 def _read(demo: Demo) -> None:
-    from elevon.calibrate.log import bench_log
+    from elevon.logs.drive import drive_log
     from elevon.logs.importing import import_log, same_rate
+    from elevon.logs.read import log_of
 
     def work() -> None:
         names = [log["name"] for log in demo.bench_truth["logs"]]
         demo.imported = [import_log(demo.folder / "logs" / f"{name}.csv") for name in names]
         same_rate(demo.imported)
-        demo.logs = [bench_log(item) for item in demo.imported]
+        demo.logs = [drive_log(log_of(item)) for item in demo.imported]
 
     demo.timed("import and synchronisation of the two clocks", work)
 
@@ -240,18 +243,18 @@ def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> N
     used = [log for log in demo.logs if log.name != f"{HELD_OUT}.csv"]
     target = demo.folder / "calibrated.toml"
 
-    def work() -> Recovered:
+    def work() -> Calibration:
         result = calibrate(used, demo.base, progress=progress)
         write_calibration(target, result, force=True)
-        return Recovered.of(result)
+        return result
 
     demo.calibration = demo.resumed(
         "calibration on three logs",
         Work(
             "calibration",
             work,
-            lambda calibration: calibration.to_json(demo.base),
-            lambda data: Recovered.from_json(data, demo.base),
+            Calibration.to_dict,
+            Calibration.from_dict,
             inputs_of(logs),
             [target],
         ),
@@ -283,7 +286,7 @@ def _truth(demo: Demo) -> dict[str, float]:
 
 
 def _validate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> None:
-    from elevon.calibrate import validate
+    from elevon.calibrate import Validation, validate
 
     def validated(piece: str, actuator: Actuator, share: Progress | None) -> Validation:
         what = "published" if piece == "before" else "calibrated"
@@ -292,8 +295,8 @@ def _validate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> No
             Work(
                 piece,
                 lambda: validate(demo.logs, actuator, progress=share),
-                validation_to_json,
-                validation_from_json,
+                Validation.to_dict,
+                Validation.from_dict,
                 inputs_of(logs, actuator.hash),
             ),
         )

@@ -56,9 +56,9 @@ def named_faults(result: Diagnosis) -> Mapping[str, float]:
     if result.status == "healthy":
         return {}
     for item in result.hypotheses:
-        keys = [f"{kind}@{place}" for kind, place, _ in item.faults]
-        if sorted(keys) == sorted(result.best):
-            return dict(zip(keys, item.severity, strict=True))
+        severities = {f"{f.kind}@{f.place}": f.severity for f in item.faults}
+        if sorted(severities) == sorted(result.best):
+            return severities
     seen = {f"{c.kind}@{c.place}": c.severity for c in result.faults}
     return {key: seen[key] for key in result.best if key in seen}
 

@@ -46,11 +46,11 @@ class LoadTable:
     mach: Array
     linear: bool = False
 
-    def load_term(self, *, repeat: bool = False) -> dict[str, Any]:
+    def load_term(self, *, repeat: bool = False) -> dict[str, object]:
         """Return the table as one entry of ``load.output.terms``."""
         return _term(self.time, self.load, "N" if self.linear else "N m", repeat)
 
-    def command_term(self, *, repeat: bool = False) -> dict[str, Any]:
+    def command_term(self, *, repeat: bool = False) -> dict[str, object]:
         """Return the position as one entry of ``command.terms``."""
         return _term(self.time, self.position, "m" if self.linear else "rad", repeat)
 

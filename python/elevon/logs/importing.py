@@ -360,8 +360,3 @@ def _meta(
         "command_note": note.to_dict() if note else None,
         "import": report.to_dict(),
     }
-
-
-def with_source(log: ImportedLog, name: str) -> ImportedLog:
-    """Return the same log under another name in its metadata."""
-    return dataclasses.replace(log, recording=log.recording.with_meta(log=name))

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, filtered
 from elevon.errors import InputError, SimulationError
+from elevon.estimate.held_out import folds
 from elevon.parameters.records import records
 
 if TYPE_CHECKING:
@@ -220,10 +221,10 @@ class _Problem:
         if count < 2:
             return dict.fromkeys(paths, float("nan"))
         solutions = []
-        for left in range(count):
+        for number, (others, _) in enumerate(folds(range(count))):
             if progress is not None:
-                progress(0.9 + 0.1 * left / count)
-            solutions.append(self.solve(paths, [row for row in range(count) if row != left]))
+                progress(0.9 + 0.1 * number / count)
+            solutions.append(self.solve(paths, others))
         return {
             path: math.sqrt(
                 (count - 1) / count * sum((x[path] - best[path]) ** 2 for x in solutions)

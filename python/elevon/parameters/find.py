@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from elevon.errors import InputError, UnknownNameError, unknown
+from elevon.files import visible
 
 __all__ = ["VARIABLE", "find_set", "is_shipped", "set_names", "set_paths"]
 
@@ -18,7 +19,7 @@ _SHIPPED = Path(__file__).parent.parent / "actuators"
 def set_paths() -> dict[str, Path]:
     """Return every actuator file by name; yours hides a shipped one of the same name."""
     folders = [_SHIPPED, *_user_folders()]
-    return {file.stem: file for folder in folders for file in sorted(folder.glob("*.toml"))}
+    return {file.stem: file for folder in folders for file in visible(folder, "*.toml")}
 
 
 def set_names() -> list[str]:

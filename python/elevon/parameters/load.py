@@ -15,7 +15,7 @@ from elevon.parameters.find import find_set, is_shipped
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import Record, records, wiring_names
 from elevon.parameters.set import ParameterSet
-from elevon.units import parse_quantity
+from elevon.units import parse_quantity, split_quantity
 
 __all__ = ["SetFile", "load_set", "set_errors"]
 
@@ -23,8 +23,6 @@ _HEADER_KEYS = (
     "name", "title", "wiring", "base", "references", "scenario", "compare", "validation",
 )  # fmt: skip
 
-
-_AMOUNT = re.compile(r"^\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?")
 
 #: The source of a value that was written without one.
 GIVEN = "given by the caller"
@@ -250,7 +248,7 @@ def _given(path: str, raw: Any, record: Record, place: str, below: Parameter | N
     unit = record.unit if below is None or not below.unit else below.unit
     text = raw if isinstance(raw, str) else repr(raw)
     value = record.read(text, place, unit)
-    written = "" if record.choices else _AMOUNT.sub("", text).strip()
+    written = "" if record.choices else (split_quantity(text) or ("", ""))[1]
     return Parameter(
         path=path,
         value=value,

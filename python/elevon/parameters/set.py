@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from elevon.errors import InputError, unknown
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import positions, record_of, records
+from elevon.plain import plain, read_plain
 
 if TYPE_CHECKING:
     import numpy as np
@@ -97,6 +98,17 @@ class ParameterSet(Mapping[str, Parameter]):
 
     def __reduce__(self) -> tuple[type[ParameterSet], tuple[str, dict[str, Parameter]]]:
         return ParameterSet, (self.wiring, dict(self._items))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return wiring and entries, plain types; defaults of the model are left out."""
+        entries = {p: item for p, item in self._items.items() if item.confidence != "default"}
+        return {"wiring": self.wiring, "entries": plain(entries)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], place: str = "") -> ParameterSet:
+        """Read the mapping that `to_dict` returns; errors as the constructor."""
+        entries = read_plain(dict[str, Parameter], data.get("entries"), place)
+        return cls(str(data.get("wiring")), entries, place)
 
     def value(self, path: str) -> float:
         """Return one number in SI; a choice as its index."""

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 
+from elevon.plain import STORED, WORKING, Plain, in_unit, key
 from elevon.prognose.future import Future
+from elevon.results import Result
 
-__all__ = ["KnownFault", "Prognosis", "survival"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from elevon.report import Report
+
+__all__ = ["KnownFault", "OffLaw", "Prognosis", "Reserve", "survival"]
 
 
 @dataclass(frozen=True)
-class KnownFault:
+class KnownFault(Plain):
     """What is known of one fault at the last inspection.
 
     Attributes
@@ -41,26 +48,50 @@ class KnownFault:
     factor: float
     factor_interval: tuple[float, float]
     inspections: int
-    growing: float = 1.0
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "kind": self.kind,
-            "place": self.place,
-            "unit": self.unit,
-            "law": self.law,
-            "severity": self.severity,
-            "interval": list(self.interval),
-            "factor": self.factor,
-            "factor_interval": list(self.factor_interval),
-            "inspections": self.inspections,
-            "p_growing": self.growing,
-        }
+    growing: Annotated[float, key("p_growing")] = 1.0
 
 
 @dataclass(frozen=True)
-class Prognosis:
+class Reserve(Plain):
+    """A requirement: what it measures, its value now, that at which life ends, their unit."""
+
+    name: str
+    measure: str
+    value: float
+    threshold: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class OffLaw(Plain):
+    """A diagnosis that contradicts law and history.
+
+    Attributes
+    ----------
+    usage : float
+        Of the inspection.
+    fault : str
+        ``KIND@PLACE``.
+    deviations : float
+        By which the severity stands above what was expected.
+    """
+
+    usage: float
+    fault: str
+    deviations: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        side = "above" if self.deviations > 0.0 else "below"
+        return (
+            f"{self.fault} at {self.usage:g} stands {abs(self.deviations):.3g} deviations {side} "
+            "what law and history expected"
+        )
+
+
+@dataclass(frozen=True)
+class Prognosis(Result):
     """Remaining useful life of one unit.
 
     Attributes
@@ -77,26 +108,94 @@ class Prognosis:
         Names, in the order of `Future.first`.
     known : tuple of KnownFault
         Severities and growth at the last inspection.
-    reserve : tuple of dict
-        Each requirement's ``name``, ``value``, ``threshold``, ``unit`` at the median severities.
+    reserve : tuple of Reserve
+        Each requirement at the median severities.
     findings : tuple of str
         What the caller should know.
     serial : str
         Of the unit.
     seconds : dict of str to float
         Time of ``tables``, ``updates``, ``prediction``.
+    off_law : tuple of OffLaw
+        Diagnoses more than three deviations from what was expected.
+    horizons : tuple of float
+        N of `p_survive`; empty: round ones.
+    page : callable or None
+        Makes its page, date given.
     """
 
-    unit: str
+    unit: Annotated[str, key("rul.unit")]
     usage: float
-    level: float
-    future: Future
-    requirements: tuple[str, ...]
-    known: tuple[KnownFault, ...]
-    reserve: tuple[dict[str, Any], ...]
+    level: Annotated[float, key("rul.level")]
+    future: Annotated[Future, STORED]
+    requirements: Annotated[tuple[str, ...], key("names"), STORED]
+    known: Annotated[tuple[KnownFault, ...], key("faults")]
+    reserve: Annotated[tuple[Reserve, ...], key("requirements")]
     findings: tuple[str, ...]
-    serial: str = ""
-    seconds: Mapping[str, float] = field(default_factory=dict, compare=False)
+    serial: str | None = None
+    seconds: Annotated[Mapping[str, float], in_unit("s")] = field(
+        default_factory=dict, compare=False
+    )
+    off_law: tuple[OffLaw, ...] = ()
+    horizons: Annotated[tuple[float, ...], STORED] = ()
+    page: Annotated[Callable[[Prognosis, str | None], Report] | None, WORKING] = field(
+        default=None, compare=False, repr=False
+    )
+
+    KIND: ClassVar = "prognosis"
+    COMPUTED: ClassVar = (
+        "status",
+        "rul",
+        "p_survive",
+        "first_requirement",
+        "first_shares=first",
+        "eol_samples=samples",
+    )
+    TABLE: ClassVar = "known"
+
+    @property
+    def status(self) -> Literal["ok", "off_law"]:
+        """``ok``; ``off_law``: the history contradicts the law."""
+        return "off_law" if self.off_law else "ok"
+
+    @property
+    def rul(self) -> dict[str, object]:
+        """Remaining useful life: median, interval and its level, unit; null: no end in sight."""
+        ends = [_number(end) for end in self.interval]
+        median = _number(self.median)
+        return {"median": median, "interval": ends, "level": self.level, "unit": self.unit}
+
+    @property
+    def p_survive(self) -> list[tuple[float, float]]:
+        """Probability of surviving the next N, at `horizons` or at round N."""
+        return survival(self, self.horizons)
+
+    @property
+    def first_requirement(self) -> str | None:
+        """The requirement that most likely fails first."""
+        return next(iter(self.first)) if np.isfinite(self.future.end).any() else None
+
+    @property
+    def samples(self) -> int:
+        """How many futures there are."""
+        return len(self.future.end)
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        from elevon.prognose.page import sentence
+
+        return sentence(self)
+
+    def plot(self) -> Figure:
+        """Return the probability of surviving over use."""
+        from elevon.prognose.figures import survival_figure
+
+        return survival_figure(self)
+
+    def report(self, *, date: str | None = None) -> Report:
+        """Return its page, whole where it was computed in this process."""
+        return super().report(date=date) if self.page is None else self.page(self, date)
 
     @property
     def median(self) -> float:
@@ -124,31 +223,6 @@ class Prognosis:
     def survives(self, more: float) -> float:
         """Return the probability of surviving `more` units of use."""
         return float(np.mean(self.future.remaining > more))
-
-    def to_dict(self, horizons: Sequence[float] = ()) -> dict[str, Any]:
-        """Return the JSON form; lives without end in sight are null."""
-        low, high = self.interval
-        likely = next(iter(self.first))
-        none = not np.isfinite(self.future.end).any()
-        return {
-            "status": "ok",
-            "serial": self.serial or None,
-            "usage": self.usage,
-            "rul": {
-                "median": _number(self.median),
-                "interval": [_number(low), _number(high)],
-                "level": self.level,
-                "unit": self.unit,
-            },
-            "p_survive": [[n, p] for n, p in survival(self, horizons)],
-            "first_requirement": None if none else likely,
-            "first_shares": self.first,
-            "eol_samples": len(self.future.end),
-            "faults": [item.to_dict() for item in self.known],
-            "requirements": [dict(item) for item in self.reserve],
-            "findings": list(self.findings),
-            "seconds": dict(self.seconds),
-        }
 
 
 def _number(value: float) -> float | None:

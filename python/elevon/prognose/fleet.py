@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError
+from elevon.plain import STORED, Plain, key
+from elevon.prognose.answer import Prognosis
+from elevon.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from elevon.prognose.answer import Prognosis
 
 __all__ = ["Costs", "FleetPlan", "Visit", "fleet_figure", "plan_fleet"]
 
@@ -47,7 +48,7 @@ class Costs:
 
 
 @dataclass(frozen=True)
-class Visit:
+class Visit(Plain):
     """A visit at `use` from now, and the units done at it."""
 
     use: float
@@ -55,7 +56,7 @@ class Visit:
 
 
 @dataclass(frozen=True)
-class FleetPlan:
+class FleetPlan(Result):
     """The cheapest visits.
 
     Attributes
@@ -73,11 +74,44 @@ class FleetPlan:
     """
 
     unit: str
-    units: Mapping[str, Prognosis]
-    alone: Mapping[str, float]
+    units: Annotated[Mapping[str, Prognosis], key("predictions"), STORED]
+    alone: Annotated[Mapping[str, float], STORED]
     visits: tuple[Visit, ...]
     cost: float
     cost_alone: float
+
+    KIND: ClassVar = "fleet"
+    COMPUTED: ClassVar = ("status", "rows=table", "findings")
+    TABLE: ClassVar = "table"
+    COLUMNS: ClassVar = ("unit", "rul", "interval", "alone", "visit", "p_failed_before")
+    status: ClassVar = "ok"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return (
+            f"{len(self.visits)} visit(s) for {len(self.units)} units: expected cost "
+            f"{self.cost:.4g}, {self.cost_alone:.4g} with each unit alone."
+        )
+
+    @property
+    def table(self) -> list[dict[str, Any]]:
+        """One row a unit: its life, when it would be done alone, its visit."""
+        return [
+            {
+                "unit": name,
+                "rul": item.median,
+                "interval": list(item.interval),
+                "alone": self.alone[name],
+                "visit": self.visit_of(name),
+                "p_failed_before": 1.0 - item.survives(self.visit_of(name)),
+            }
+            for name, item in self.units.items()
+        ]
+
+    def plot(self) -> Figure:
+        """Return the remaining lives and the visits."""
+        return fleet_figure(self)
 
     def visit_of(self, name: str) -> float:
         """Return when a unit is done."""
@@ -87,31 +121,6 @@ class FleetPlan:
     def findings(self) -> list[str]:
         """What each unit's prediction must be read with, its name before it."""
         return [f"{name}: {text}" for name, item in self.units.items() for text in item.findings]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        rows = []
-        for name, item in self.units.items():
-            use = self.visit_of(name)
-            rows.append(
-                {
-                    "unit": name,
-                    "rul": item.median,
-                    "interval": list(item.interval),
-                    "alone": self.alone[name],
-                    "visit": use,
-                    "p_failed_before": 1.0 - item.survives(use),
-                }
-            )
-        return {
-            "status": "ok",
-            "unit": self.unit,
-            "rows": rows,
-            "visits": [{"use": v.use, "units": list(v.units)} for v in self.visits],
-            "cost": self.cost,
-            "cost_alone": self.cost_alone,
-            "findings": self.findings,
-        }
 
 
 def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:

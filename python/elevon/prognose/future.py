@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.plain import Plain
 from elevon.prognose.measured import governing
 from elevon.prognose.mission import Usage
 from elevon.prognose.process import Process, UnitPopulation
@@ -31,7 +32,7 @@ _QUANTILES = (0.05, 0.5, 0.95)
 
 
 @dataclass(frozen=True)
-class Future:
+class Future(Plain):
     """Ends of life.
 
     Attributes

@@ -4,7 +4,9 @@ Each inspection is a JSON file with the stamp ``usage`` (how much the unit had b
 ``unit`` (flights, landings, cycles, hours), and optionally ``date`` (ISO), ``serial``, ``reset``
 (list of ``KIND@PLACE`` whose part was made new after it). Either it is the JSON object of
 ``elevon diagnose`` with the stamp added, or it names the logs to be diagnosed: ``logs`` (list of
-files in the folder). ``healthy: true`` marks logs that serve as baseline.
+files in the folder), with ``map`` where their columns need one (a file in the folder or the name of
+a map of the package; one for all, or a list of one for each). ``healthy: true`` marks logs that
+serve as baseline.
 """
 
 from __future__ import annotations
@@ -17,7 +19,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elevon.errors import FormatError, InputError, Interrupted, unknown
-from elevon.files import read_regular
+from elevon.files import read_regular, visible
+from elevon.plain import keys_of
 from elevon.prognose.laws import LAWS
 from elevon.prognose.measured import read_measured
 from elevon.prognose.mission import UNITS_OF_USE
@@ -27,21 +30,22 @@ from elevon.prognose.predict import check_order
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel import Diagnosis
+    from elevon.logs.log import Log
     from elevon.prognose.law import Law
-    from elevon.recording import Recording
 
 __all__ = ["History", "HistoryEntry", "diagnosed", "read_history", "write_stamp"]
+
+#: A log and its column map: a file, or the name of one of the package's.
+MappedLog = tuple[Path, str | Path | None]
 
 _LONGEST = 2**24
 """Bytes of an inspection's file; it has some ten thousand."""
 
-_KEYS = frozenset({"usage", "unit", "date", "serial", "reset", "logs", "healthy", "measured"})
-_OF_DIAGNOSIS = frozenset(
-    {
-        "status", "p_fault", "p_other", "false_alarm", "chance", "faults", "best", "unobservable",
-        "detectable", "features", "findings", "hypotheses", "alternatives", "seconds", "method",
-    }
-)  # fmt: skip
+_KEYS = frozenset(
+    {"usage", "unit", "date", "serial", "reset", "logs", "map", "healthy", "measured"}
+)
+#: What `elevon diagnose` writes beside the keys of its record.
+_ABOUT = frozenset({"schema", "units", "method", "seconds"})
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,8 @@ class HistoryEntry:
         Parts made new after it.
     diagnosis : mapping or None
         None where logs are to be diagnosed.
-    logs : tuple of Path
-        Those logs.
+    logs : tuple of (Path, str or Path or None)
+        Those logs, each with its column map.
     healthy : bool
         Whether they serve as baseline.
     measured : object
@@ -74,7 +78,7 @@ class HistoryEntry:
     serial: str
     reset: tuple[str, ...]
     diagnosis: Mapping[str, Any] | None
-    logs: tuple[Path, ...]
+    logs: tuple[MappedLog, ...]
     healthy: bool
     measured: Any = None
 
@@ -158,7 +162,7 @@ def read_history(folder: str | Path, *, unit: str) -> History:
     place = Path(folder).expanduser()
     if not place.is_dir():
         raise InputError(f"{place}: is not a folder")
-    entries = [e for path in sorted(place.glob("*.json")) if (e := _entry(path)) is not None]
+    entries = [e for path in visible(place, "*.json") if (e := _entry(path)) is not None]
     if not entries:
         raise InputError(
             f"{place}: no inspections: no *.json in it has the key 'usage' "
@@ -203,12 +207,12 @@ def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
     unit = data.get("unit")
     if unit not in UNITS_OF_USE:
         raise FormatError(f"{path}: unit = {unit!r} is none of {', '.join(UNITS_OF_USE)}")
-    logs = tuple(path.parent / str(name) for name in _texts(path, data, "logs"))
+    logs = _logs(path, data)
     diagnosis = None if logs else data
     if diagnosis is not None and "faults" not in data:
         raise FormatError(f"{path}: has neither 'faults' (a diagnosis) nor 'logs' to be diagnosed")
     _check_keys(path, data)
-    missing = next((log for log in logs if not log.is_file()), None)
+    missing = next((log for log, _ in logs if not log.is_file()), None)
     if missing is not None:
         raise InputError(f"{path}: the log {missing.name} is not there")
     entry = HistoryEntry(
@@ -225,10 +229,29 @@ def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
     return entry, str(unit)
 
 
+def _logs(path: Path, data: Mapping[str, Any]) -> tuple[MappedLog, ...]:
+    """The logs, each with its map: ``map`` is one for all of them, or a list of one for each."""
+    names = _texts(path, data, "logs")
+    one = isinstance(data.get("map"), str)
+    maps = [data["map"]] * len(names) if one else _texts(path, data, "map")
+    if maps and len(maps) != len(names):
+        raise FormatError(f"{path}: map names {len(maps)} for {len(names)} logs; one for each")
+    near = [path.parent / name if (path.parent / name).is_file() else name for name in maps]
+    folder = path.parent
+    return tuple((folder / name, near[k] if near else None) for k, name in enumerate(names))
+
+
+def known_keys() -> frozenset[str]:
+    """Return the keys that an inspection may have: its stamp's, and those of a diagnosis."""
+    from elevon.diagnose.bymodel.answer import Diagnosis
+
+    return _KEYS | _ABOUT | keys_of(Diagnosis)
+
+
 def _check_keys(path: Path, data: Mapping[str, Any]) -> None:
     from elevon.errors import did_you_mean
 
-    known = _KEYS | _OF_DIAGNOSIS
+    known = known_keys()
     for key in data:
         if key not in known:
             hint = did_you_mean(key, sorted(_KEYS))
@@ -258,7 +281,7 @@ def diagnosed(
     history: History,
     actuator: Actuator,
     *,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> History:
     """Diagnose the logs of a history that stand there without their diagnosis.
 
@@ -293,36 +316,24 @@ def diagnosed(
 
 
 def _diagnosis_by(
-    actuator: Actuator, healthy: Sequence[Path]
-) -> Callable[[Sequence[Path]], Diagnosis]:
+    actuator: Actuator, healthy: Sequence[MappedLog]
+) -> Callable[[Sequence[MappedLog]], Diagnosis]:
     """Return what diagnoses logs together, against healthy ones: as `elevon diagnose` does."""
-    if actuator.wiring == "rotary":
-        from elevon.diagnose.bymodel import diagnose, read_test_logs
+    from elevon.diagnose.door import diagnose
 
-        baselines = read_test_logs(healthy)
-        return lambda logs: diagnose(read_test_logs(logs), actuator, baselines=baselines)
-    from elevon.diagnose.byroles import diagnose_by_roles
-
-    others = _recordings(healthy)
-    return lambda logs: diagnose_by_roles(_recordings(logs), actuator, baselines=others)
+    others = _read(healthy)
+    return lambda logs: diagnose(_read(logs), actuator, others)
 
 
-def _recordings(paths: Sequence[Path]) -> list[tuple[str, Recording]]:
-    from elevon.logs.importing import import_log
-    from elevon.recording import Recording
+def _read(logs: Sequence[MappedLog]) -> list[Log]:
+    from elevon.logs.read import read_logs
 
-    out = []
-    for path in paths:
-        try:
-            out.append((path.name, Recording.load(path)))
-        except (FormatError, InputError):
-            out.append((path.name, import_log(path).recording))
-    return out
+    return read_logs([path for path, _ in logs], [column_map for _, column_map in logs])
 
 
 def write_stamp(
     path: str | Path,
-    data: Mapping[str, Any],
+    data: Mapping[str, object],
     *,
     usage: float,
     unit: str,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class Measured:
     deviation: float
 
 
-def read_measured(data: Any, units: Mapping[str, str], place: str) -> dict[str, Measured]:
+def read_measured(data: object, units: Mapping[str, str], place: str) -> dict[str, Measured]:
     """Read ``{NAME: {"value": ..., "deviation": ...}}``: numbers in SI, or texts with a unit.
 
     Parameters

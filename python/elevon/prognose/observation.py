@@ -131,7 +131,7 @@ class Inspection:
 
 
 def inspection(
-    data: Mapping[str, Any],
+    data: Mapping[str, object],
     laws: Sequence[Law],
     *,
     usage: float,

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.prognose.answer import survival
 from elevon.prognose.figures import course_figure, severity_unit, survival_figure
 from elevon.prognose.observation import Inspection
 from elevon.report import Report, ReportTable
@@ -21,7 +20,14 @@ __all__ = ["prognosis_page", "sentence"]
 
 
 def sentence(result: Prognosis) -> str:
-    """Return the answer in one sentence."""
+    """Return the answer in one sentence, and where the history contradicts the law, that."""
+    if not result.off_law:
+        return _remaining(result)
+    worst = max(result.off_law, key=lambda item: abs(item.deviations))
+    return f"{_remaining(result)} The history contradicts the law: {worst.text}."
+
+
+def _remaining(result: Prognosis) -> str:
     low, high = result.interval
     if not np.isfinite(result.median):
         return (
@@ -45,7 +51,7 @@ def prognosis_page(
     date: str | None = None,
 ) -> Report:
     """Return the report of a prognosis."""
-    name = f"{actuator} {result.serial}".strip()
+    name = f"{actuator} {result.serial or ''}".strip()
     report = Report(f"Remaining life of {name}", sentence(result), date=date)
     future = report.section("What is to come")
     future.figure(
@@ -57,7 +63,7 @@ def prognosis_page(
         survival_figure(result),
         "Probability of surviving the next N; lines: median and interval of the remaining life.",
     )
-    rows = [(f"{n:g}", p) for n, p in survival(result)]
+    rows = [(f"{n:g}", p) for n, p in result.p_survive]
     future.table(ReportTable((f"next N {result.unit}", "probability"), rows, digits=3))
     _requirements(report, result)
     _faults(report, result)
@@ -70,14 +76,14 @@ def prognosis_page(
 def _requirements(report: Report, result: Prognosis) -> None:
     rows = []
     for item in result.reserve:
-        unit = severity_unit(item["unit"])
+        unit = severity_unit(item.unit)
         rows.append(
             (
-                item["name"],
-                to_display(item["value"], unit),
-                to_display(item["threshold"], unit),
+                item.name,
+                to_display(item.value, unit),
+                to_display(item.threshold, unit),
                 unit,
-                100.0 * result.first[item["name"]],
+                100.0 * result.first[item.name],
             )
         )
     report.section("What must hold").table(

@@ -18,7 +18,7 @@ from elevon.prognose.process import Process, UnitPopulation
 __all__ = ["COUNT", "ParticleFilter", "resampled"]
 
 COUNT = 2000
-SURPRISE = 4.0
+SURPRISE = 3.0
 _KERNEL = 0.08  # variance of what is drawn that is drawn anew, a lost share of the particles
 _FEWEST = 0.5  # effective particles, of all, that one share of a likelihood leaves
 _HALVINGS = 8  # so that a likelihood is applied in 256 shares at most

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.errors import InputError
-from elevon.prognose.answer import KnownFault, Prognosis
+from elevon.prognose.answer import KnownFault, OffLaw, Prognosis, Reserve
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.observation import Inspection
 from elevon.prognose.particle import COUNT, ParticleFilter, resampled
@@ -107,13 +107,13 @@ def prognosis(
     severity = np.array([item.severity for item in known])
     values = response.measured(severity[None, :])[:, 0]
     reserve = tuple(
-        {
-            "name": item.name,
-            "measure": item.measure,
-            "value": _measured(item, float(values[k]), known),
-            "threshold": response.thresholds[k],
-            "unit": response.units[k],
-        }
+        Reserve(
+            item.name,
+            item.measure,
+            _measured(item, float(values[k]), known),
+            response.thresholds[k],
+            response.units[k],
+        )
         for k, item in enumerate(response.requirements)
     )
     result = Prognosis(
@@ -125,8 +125,7 @@ def prognosis(
         known,
         reserve,
         (),
-        serial,
-        {},
+        serial or None,
     )
     return _with_findings(result, flt, inspections)
 
@@ -206,11 +205,8 @@ def _with_findings(
 
     process = flt.process
     findings = list(_thin(result, inspections))
-    findings += [
-        f"{key} at {usage:g} {result.unit} stands {abs(score):.3g} deviations "
-        f"{'above' if score > 0.0 else 'below'} what law and history expected"
-        for usage, key, score in flt.surprises
-    ]
+    off_law = tuple(OffLaw(*surprise) for surprise in flt.surprises)
+    findings += [item.text for item in off_law]
     seen = {key for item in inspections for key in item.seen}
     findings += _stray(flt, inspections)
     findings += [
@@ -227,7 +223,7 @@ def _with_findings(
     if far > 0.0:
         findings.append(f"no end of life is in sight in {100.0 * far:.3g} % of the futures")
     findings += _beyond(result, process)
-    return replace(result, findings=tuple(findings))
+    return replace(result, findings=tuple(findings), off_law=off_law)
 
 
 def _stray(flt: ParticleFilter, inspections: Sequence[Inspection]) -> list[str]:

@@ -20,7 +20,7 @@ from elevon.prognose.process import Process, UnitPopulation
 __all__ = ["from_samples", "progpy_model", "to_samples"]
 
 
-def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> Any:
+def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> object:
     """Return a ``progpy.PrognosticsModel``.
 
     States are ``damage KIND@PLACE``, ``growth KIND@PLACE`` (logarithm of the factor on the law's
@@ -88,7 +88,7 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> A
     return Actuator(process_noise=0.0, measurement_noise=0.0)
 
 
-def to_samples(units: UnitPopulation, process: Process) -> Any:
+def to_samples(units: UnitPopulation, process: Process) -> object:
     """Return units of equal weight as ``progpy.uncertain_data.UnweightedSamples`` of states.
 
     A fault that does not grow gets a growth of -700: the exponential of it is nothing.

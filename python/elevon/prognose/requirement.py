@@ -272,10 +272,10 @@ def _lock_time(runs: Sequence[RunSignals], requirement: Requirement) -> float:
 
 
 def _bare_run(mission: Scenario, seconds: float, terms: list[dict[str, Any]]) -> Scenario:
-    """Return a run of its own with the mission's parameters and supply, without its loads."""
+    """Return a run of its own with the mission's parameters, supply and air, without its loads."""
     of_mission = mission.to_dict()
     data: dict[str, Any] = {
-        key: of_mission[key] for key in ("parameters", "supply") if key in of_mission
+        key: of_mission[key] for key in ("parameters", "supply", "ambient") if key in of_mission
     }
     return Scenario.from_dict({**data, "duration": seconds, "command": {"terms": terms}})
 

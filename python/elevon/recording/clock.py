@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -81,7 +80,7 @@ class Clock:
         return same and self.time.tobytes() == other.time.tobytes()
 
 
-def frozen(values: Any, place: str) -> Floats:
+def frozen(values: object, place: str) -> Floats:
     """Return values as a read-only float64 vector, without copying one that already is."""
     try:
         array = np.asarray(values)

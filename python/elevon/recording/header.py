@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError
+from elevon.errors import DamageError, FormatError, InputError
 
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
@@ -117,11 +117,13 @@ class Header:
 
         Raises
         ------
+        DamageError
+            Not the JSON of a recording: no log of somebody else's either.
         FormatError
-            Not the JSON of a recording, or of a later schema.
+            Of a later schema.
         """
         if len(text) > _LONGEST:
-            raise FormatError(f"{place}: its description is longer than {_LONGEST} bytes")
+            raise DamageError(f"{place}: its description is longer than {_LONGEST} bytes")
         try:
             document = _decoded(json.loads(text))
             if document["schema"] not in _READ:
@@ -136,7 +138,7 @@ class Header:
         except FormatError:
             raise
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            raise FormatError(f"{place}: its description is damaged: {error!r}") from error
+            raise DamageError(f"{place}: its description is damaged: {error!r}") from error
 
 
 def _clock(entry: Mapping[str, Any]) -> ClockHeader:

@@ -24,12 +24,13 @@ from elevon.recording.names import check_name
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["check", "read", "write"]
+__all__ = ["check", "read", "write", "write_structs"]
 
 _Array = npt.NDArray[np.float64]
 _Value = _Array | str | dict[str, _Array]
 
 _LIMIT = 2**31 - 1
+_TEXT = b"MATLAB 5.0 MAT-file, written by Elevon"
 _PER_CHANNEL = 256
 """Upper bound of the bytes that a version 5 file spends on a vector beside its numbers."""
 
@@ -49,15 +50,22 @@ def check(recording: Recording) -> None:
 
 def write(recording: Recording, path: Path) -> None:
     """Write the structs."""
-    from scipy.io import savemat
-
     content: dict[str, Any] = {"elevon": Header.sealed(recording).to_json()}
     content["units"] = {channel.name: channel.unit for channel in recording.channels}
     for clock in recording.clocks.values():
         columns = {"time": clock.time}
         columns |= {channel.name: channel.values for channel in recording.on_clock(clock.name)}
         content[clock.name] = columns
+    write_structs(path, content)
+
+
+def write_structs(path: Path, content: dict[str, object]) -> None:
+    """Write structs; their header has no time of day, so the same content is the same bytes."""
+    from scipy.io import savemat
+
     savemat(path, content, appendmat=False, format="5", oned_as="column", do_compression=False)
+    with path.open("r+b") as stream:
+        stream.write(_TEXT.ljust(116))
 
 
 def read(path: Path, max_bytes: int) -> Contents:

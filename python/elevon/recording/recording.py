@@ -100,8 +100,8 @@ class Recording:
         clock: str = "main",
         rate: float | None = None,
         gaps: Sequence[int] | None = None,
-        meta: Mapping[str, Any] | None = None,
-        labels: Sequence[Any] | Mapping[str, Any] | None = None,
+        meta: Mapping[str, object] | None = None,
+        labels: Sequence[object] | Mapping[str, object] | None = None,
     ) -> "Recording":
         """Make a recording on one clock from arrays in any units; `joined` adds further clocks.
 

@@ -59,7 +59,7 @@ def all_passed(checks: Iterable[Check]) -> bool:
     return bool(results) and all(results)
 
 
-def verdict(checks: Sequence[Check]) -> dict[str, Any]:
+def verdict(checks: Sequence[Check]) -> dict[str, object]:
     """Return ``status`` (``pass``, ``fail``) and ``checks``, as every reproduction prints them."""
     return {
         "status": "pass" if all_passed(checks) else "fail",

@@ -11,6 +11,7 @@ from html import unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from elevon.files import visible, write_text
 from elevon.report.checks import Check, all_passed
 from elevon.report.policy import policy
 
@@ -263,17 +264,27 @@ class Report:
 
         return assets()
 
-    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+    def save(
+        self, path: str | os.PathLike[str], *, force: bool = False, links: bool = True
+    ) -> Path:
         """Write the page, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            File.
+        force : bool
+            Whether an existing file may be replaced.
+        links : bool
+            Whether it links to the reports that stand beside it: not where work writes several
+            pages, and an older one of them may stand there.
 
         Raises
         ------
         OutputExistsError, OutputError
             As `elevon.files.write_text`.
         """
-        from elevon.files import write_text
-
-        self.beside = _pages_beside(Path(path).expanduser())
+        self.beside = _pages_beside(Path(path).expanduser()) if links else {}
         return write_text(path, self.html(), force=force)
 
 
@@ -284,7 +295,7 @@ _HEAD = 4096  # bytes of a page in which its mark and its title stand
 def _pages_beside(path: Path) -> dict[str, str]:
     """Return the other reports of a page's folder: file name to title, for the page to link to."""
     pages = {}
-    for other in sorted(path.parent.glob("*.html")):
+    for other in visible(path.parent, "*.html"):
         if other.name == path.name:
             continue
         with suppress(OSError), other.open(encoding="utf-8", errors="replace") as stream:

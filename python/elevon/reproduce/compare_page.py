@@ -50,7 +50,7 @@ _NAMES = {"position": "Output position", "speed": "Motor speed", "q_current": "T
 def _panel(comparison: Comparison, part: str) -> tuple[str, str, float]:
     """Signal, label and scale of one panel."""
     name = comparison.signals[part]
-    unit = comparison.recordings[0][name].unit
+    unit = {"position": comparison.unit, "speed": "rad/s", "q_current": "A"}[part]
     text, scale = _DISPLAYED.get(unit, (unit, 1.0))
     return name, f"{_NAMES[part]} [{text}]", scale
 

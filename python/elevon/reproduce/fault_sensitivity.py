@@ -62,6 +62,8 @@ ROTARY_FAULTS = (
     "gain_drift@control.speed=-0.2",
     "dropout@sensor.resolver=0.2",
     "mismatch@sensor.resolver=0.2",
+    "quadrature@sensor.resolver=0.2",
+    "channel_offset@sensor.resolver.sine=0.1",
     "offset@sensor.resolver=5 deg",
     "resolver_short@sensor.resolver.sine=0.2",
     "resolver_open@sensor.resolver.sine=1",
@@ -70,6 +72,8 @@ ROTARY_FAULTS = (
     "gain@sensor.encoder=0.01",
     "missing_counts@sensor.encoder=0.01",
     "dark_sectors@sensor.encoder=0.05",
+    "interpolation@sensor.encoder.first=0.1",
+    "interpolation@sensor.encoder.second=0.1",
     "stuck@sensor.encoder=1",
     "dead@sensor.encoder=1",
 )
@@ -77,8 +81,9 @@ ROTARY_FAULTS = (
 
 What is on or off is on; mechanical wear is that of `backlash`; a contact between or from windings
 is 100 ohm, which the drive feeds beside them without tripping; a resolver's winding loses what
-`mismatch` does. A sensor fails that the loops of the shipped actuator file do not close over, where
-the catalogue offers one: a loop around a failed sensor runs away, and nothing is left to compare.
+`mismatch` does, and its windings and channels err by as large an angle. A sensor fails that the
+loops of the shipped actuator file do not close over, where the catalogue offers one: a loop around
+a failed sensor runs away, and nothing is left to compare.
 """
 
 RECORD = (

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.plain import Plain
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import Stroke, run_strokes
 
@@ -91,7 +92,7 @@ class HydraulicActuator:
 
 
 @dataclass(frozen=True, slots=True)
-class HydraulicRow:
+class HydraulicRow(Plain):
     """Speeds in mid-stroke at one temperature, load factor and direction, and line currents.
 
     Of the electromechanical actuator with winding and lubricant at the temperature, and with the
@@ -106,19 +107,6 @@ class HydraulicRow:
     electric_winding_mm_s: float
     electric_a: float
     electric_winding_a: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {
-            "temperature_c": self.temperature_c,
-            "nz": self.nz,
-            "direction": self.direction,
-            "hydraulic_mm_s": self.hydraulic_mm_s,
-            "electric_mm_s": self.electric_mm_s,
-            "electric_winding_mm_s": self.electric_winding_mm_s,
-            "electric_a": self.electric_a,
-            "electric_winding_a": self.electric_winding_a,
-        }
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ _SIGNS = {
     "stopped": "S",
     "released": "F",
     "fault": "X",
+    "unconfirmed": "U",
+    "off": "O",
 }
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import SimulationError
+from elevon.plain import Plain
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, Stroke, run_strokes
 
@@ -41,7 +42,7 @@ SUPPLY = 30.3
 
 
 @dataclass(frozen=True, slots=True)
-class FrictionRow:
+class FrictionRow(Plain):
     """A quantity put into the model and recovered from the logs."""
 
     quantity: str
@@ -51,18 +52,6 @@ class FrictionRow:
     put_in: float
     recovered: float
     unit: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {
-            "quantity": self.quantity,
-            "direction": self.direction,
-            "speed_mm_s": self.speed_mm_s,
-            "load_n": self.load_n,
-            "put_in": self.put_in,
-            "recovered": self.recovered,
-            "unit": self.unit,
-        }
 
 
 @dataclass(frozen=True)

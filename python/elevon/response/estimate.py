@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.plain import STORED, in_unit, key
+from elevon.response.band import AgreementBand
+from elevon.response.linear import LinearModel
+from elevon.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,7 +23,7 @@ Complex = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class FrequencyResponse:
+class FrequencyResponse(Result):
     """What a sine of each frequency becomes.
 
     Attributes
@@ -45,16 +49,70 @@ class FrequencyResponse:
         Independent inputs the figures stand on.
     """
 
-    frequency: Floats
-    response: Complex
+    frequency: Annotated[Floats, key("frequency_hz"), in_unit("Hz")]
+    response: Annotated[Complex, STORED]
     coherence: Floats
-    std: Floats
+    std: Annotated[Floats, key("gain_relative_std")]
     input: str
     output: str
     unit: str
     method: str
     amplitude: float
     realisations: int
+    actuator: str = ""
+    linear: LinearModel | None = None
+    band: AgreementBand | None = None
+
+    KIND: ClassVar = "response"
+    COMPUTED: ClassVar = (
+        "status",
+        "gain",
+        "gain_db",
+        "phase_deg",
+        "bandwidth_hz=bandwidth",
+        "lag_90_hz=lag_90",
+    )
+    TABLE: ClassVar = "lines"
+    status: ClassVar = "ok"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        reached = [
+            f"{text} at {value:.3g} Hz" if value is not None else f"{text} not reached"
+            for text, value in (("gain -3 dB", self.bandwidth), ("phase -90 deg", self.lag_90))
+        ]
+        return f"{self.input} to {self.output} of {self.actuator}: {', '.join(reached)}."
+
+    @property
+    def gain_db(self) -> Floats:
+        """Gain in decibels, shape (n,)."""
+        return np.asarray(20.0 * np.log10(self.gain))
+
+    @property
+    def phase_deg(self) -> Floats:
+        """Phase in degrees, unwrapped, shape (n,)."""
+        return np.asarray(np.rad2deg(self.phase))
+
+    @property
+    def bandwidth(self) -> float | None:
+        """Frequency in Hz at which the gain has fallen by 3 dB for good, or None."""
+        return self.crossing()
+
+    @property
+    def lag_90(self) -> float | None:
+        """Frequency in Hz at which the phase first lags by 90 degrees, or None."""
+        return self.lag()
+
+    @property
+    def lines(self) -> list[dict[str, float]]:
+        """One row a frequency."""
+        columns = {
+            "frequency_hz": self.frequency, "gain_db": self.gain_db, "phase_deg": self.phase_deg,
+            "coherence": self.coherence, "gain_relative_std": self.std,
+        }  # fmt: skip
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
 
     @property
     def gain(self) -> Floats:
@@ -88,25 +146,6 @@ class FrequencyResponse:
         low, high = np.log(self.frequency[at : at + 2])
         share = level[at] / (level[at] - level[at + 1])
         return float(np.exp(low + share * (high - low)))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "input": self.input,
-            "output": self.output,
-            "unit": self.unit,
-            "method": self.method,
-            "amplitude": self.amplitude,
-            "realisations": self.realisations,
-            "frequency_hz": self.frequency,
-            "gain": self.gain,
-            "gain_db": 20.0 * np.log10(self.gain),
-            "phase_deg": np.rad2deg(self.phase),
-            "coherence": self.coherence,
-            "gain_relative_std": self.std,
-            "bandwidth_hz": self.crossing(),
-            "lag_90_hz": self.lag(),
-        }
 
     def plot(self) -> Figure:
         """Return a Bode plot: gain, phase, coherence over frequency."""

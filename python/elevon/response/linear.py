@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
+from elevon.plain import STORED, in_unit, key
+from elevon.results import Result
 from elevon.session import Session
 from elevon.simulate.arguments import ActuatorLike
 from elevon.units import parse_quantity
@@ -25,7 +27,7 @@ _SMALLEST = 1e-4  # of the largest singular value: below it stands what is not l
 
 
 @dataclass(frozen=True)
-class LinearModel:
+class LinearModel(Result):
     """``x[k+1] = a x[k] + b u[k]``, ``y[k] = c x[k] + d u[k]``, deviations from an operating point.
 
     The state is balanced: it has no physical names, and no part that input or output do not see.
@@ -53,13 +55,27 @@ class LinearModel:
     b: Floats
     c: Floats
     d: Floats
-    period: float
+    period: Annotated[float, key("period_s"), in_unit("s")]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     point: Mapping[str, float]
-    singular_values: Floats
+    singular_values: Annotated[Floats, STORED]
     error: float
     nonlinearity: float
+
+    KIND: ClassVar = "linear-model"
+    COMPUTED: ClassVar = ("poles=pole_parts",)
+    TABLE: ClassVar = "pole_parts"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return f"{', '.join(self.inputs)} to {', '.join(self.outputs)}: {self.order} states."
+
+    @property
+    def pole_parts(self) -> list[dict[str, float]]:
+        """Real and imaginary part of each pole, 1/s."""
+        return [{"real": x.real, "imaginary": x.imag} for x in self.poles]
 
     @property
     def order(self) -> int:
@@ -82,23 +98,6 @@ class LinearModel:
         from scipy.signal import StateSpace
 
         return StateSpace(self.a, self.b, self.c, self.d, dt=self.period)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        poles = self.poles
-        return {
-            "a": self.a,
-            "b": self.b,
-            "c": self.c,
-            "d": self.d,
-            "period_s": self.period,
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
-            "point": dict(self.point),
-            "poles": [{"real": x.real, "imaginary": x.imag} for x in poles],
-            "error": self.error,
-            "nonlinearity": self.nonlinearity,
-        }
 
 
 def linearise(
@@ -136,7 +135,8 @@ def linearise(
     settle : float or str
         Time until the point is reached.
     period, horizon : float or str
-        Sampling of the model, and length of the impulse responses.
+        Sampling of the model, and length of the impulse responses. Inputs are held over a period:
+        a sine of the same samples, whose slope the derivative answers, acts up to a period sooner.
     pulse : float
         Height in the input's SI unit: small enough that no limit is met.
     order : int, optional

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError, unknown
+from elevon.plain import STORED, in_unit, key
 from elevon.progress import Progress
-from elevon.response.margins import Margins, margins
+from elevon.response.margins import Margin, Margins, margins
 from elevon.response.measure import Multisine, frequencies, require_finished, scenario_of
+from elevon.results import Result
 from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
 from elevon.units import parse_quantity, shown_unit
@@ -42,7 +44,7 @@ _SAMPLES = 20
 
 
 @dataclass(frozen=True)
-class LoopResponse:
+class LoopResponse(Result):
     """The open loop at each line.
 
     Attributes
@@ -66,14 +68,50 @@ class LoopResponse:
     """
 
     loop: str
-    frequency: Floats
-    response: Complex
+    frequency: Annotated[Floats, key("frequency_hz"), in_unit("Hz")]
+    response: Annotated[Complex, STORED]
     coherence: Floats
-    std: Floats
+    std: Annotated[Floats, key("gain_relative_std")]
     command: str
     feedback: str
     amplitude: float
     realisations: int
+    actuator: str = ""
+
+    KIND: ClassVar = "loop-response"
+    COMPUTED: ClassVar = ("status", "gain_db", "phase_deg", "margins", "hint")
+    TABLE: ClassVar = "margins_table"
+    status: ClassVar = "ok"
+
+    @property
+    def margins_table(self) -> dict[str, Margin]:
+        """The margins by name."""
+        every = self.margins
+        return {
+            "crossover [Hz]": every.crossover,
+            "phase margin [deg]": every.phase,
+            "gain margin [dB]": every.gain,
+            "disk margin": every.disk,
+        }
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        parts = [
+            f"{name} {'not reached' if margin.value is None else f'{margin.value:.3g}'}"
+            for name, margin in self.margins_table.items()
+        ]
+        return f"{self.loop} loop of {self.actuator}: {', '.join(parts)}."
+
+    @property
+    def gain_db(self) -> Floats:
+        """Gain in decibels, shape (n,)."""
+        return np.asarray(20.0 * np.log10(np.abs(self.response)))
+
+    @property
+    def phase_deg(self) -> Floats:
+        """Phase in degrees, unwrapped, shape (n,)."""
+        return np.asarray(np.rad2deg(np.unwrap(np.angle(self.response))))
 
     @cached_property
     def margins(self) -> Margins:
@@ -106,23 +144,6 @@ class LoopResponse:
         return bode_plot(
             self.frequency, self.response, self.std, self.coherence, title=f"{self.loop} loop"
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "loop": self.loop,
-            "command": self.command,
-            "feedback": self.feedback,
-            "amplitude": self.amplitude,
-            "realisations": self.realisations,
-            "frequency_hz": self.frequency,
-            "gain_db": 20.0 * np.log10(np.abs(self.response)),
-            "phase_deg": np.rad2deg(np.unwrap(np.angle(self.response))),
-            "coherence": self.coherence,
-            "gain_relative_std": self.std,
-            "margins": self.margins.to_dict(),
-            "hint": self.hint,
-        }
 
 
 def loop_response(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.plain import Plain, in_unit, key
 
 __all__ = ["Margin", "Margins", "margins"]
 
@@ -20,7 +21,7 @@ _FINE = 40  # points between two lines, where the loop is interpolated
 
 
 @dataclass(frozen=True)
-class Margin:
+class Margin(Plain):
     """One margin.
 
     Attributes
@@ -35,16 +36,11 @@ class Margin:
 
     value: float | None
     interval: tuple[float, float] | None
-    frequency: float | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        interval = None if self.interval is None else list(self.interval)
-        return {"value": self.value, "interval": interval, "frequency_hz": self.frequency}
+    frequency: Annotated[float | None, key("frequency_hz"), in_unit("Hz")]
 
 
 @dataclass(frozen=True)
-class Margins:
+class Margins(Plain):
     """Margins of a loop ``L`` under negative feedback.
 
     Attributes
@@ -61,20 +57,13 @@ class Margins:
         (P. Seiler, A. Packard, P. Gahinet, IEEE Control Systems Magazine 40(5), 2020).
     """
 
-    crossover: Margin
-    phase: Margin
-    gain: Margin
-    disk: Margin
+    crossover: Annotated[Margin, key("crossover_hz"), in_unit("Hz")]
+    phase: Annotated[Margin, key("phase_margin_deg"), in_unit("deg")]
+    gain: Annotated[Margin, key("gain_margin_db"), in_unit("dB")]
+    disk: Annotated[Margin, key("disk_margin")]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "crossover_hz": self.crossover.to_dict(),
-            "phase_margin_deg": self.phase.to_dict(),
-            "gain_margin_db": self.gain.to_dict(),
-            "disk_margin": self.disk.to_dict(),
-            "interval_level": LEVEL,
-        }
+    COMPUTED: ClassVar = ("interval_level",)
+    interval_level: ClassVar = LEVEL
 
 
 def margins(frequency: Floats, loop: Complex, std: Floats, seed: int = 0) -> Margins:

@@ -204,14 +204,14 @@ class Multisine:
             for f, p, a in zip(self.frequency, phases, self._shape, strict=True)
         ]
 
-    def spectrum(self, recording: Recording, name: str, mean: float = 0.0) -> Any:
+    def spectrum(self, recording: Recording, name: str, mean: float = 0.0) -> object:
         """Return a signal at the lines, averaged over the measured periods, one row."""
         count = self._count
         values = recording[name].values[count : count * (1 + _PERIODS)] - mean
         spectrum = np.fft.rfft(values.reshape(_PERIODS, count), axis=1)
         return spectrum[:, self._multiples].mean(axis=0, keepdims=True)
 
-    def spectra(self, recording: Recording, output: str, bias: float) -> tuple[Any, Any]:
+    def spectra(self, recording: Recording, output: str, bias: float) -> tuple[object, object]:
         """Return input and output at the lines."""
         return self.spectrum(recording, "command", bias), self.spectrum(recording, output)
 
@@ -263,7 +263,7 @@ def _sample(low: float, high: float, step: float) -> float:
 
 
 def scenario_of(
-    duration: float, mode: str, terms: list[dict[str, Any]], load: float | str
+    duration: float, mode: str, terms: list[dict[str, object]], load: float | str
 ) -> Scenario:
     """Return the run of one realisation."""
     loads = {"load": {"output": {"terms": [{"kind": "constant", "value": load}]}}} if load else {}

@@ -68,8 +68,9 @@ def _numbers(data: Mapping[str, Any]) -> Iterator[Finding]:
             yield from _of_terms(load, ("load", name), (_SPEED[name],))
         elif isinstance(load, Mapping):
             yield from _of_terms(load, ("load", name), ("N",))
-    if isinstance(data.get("supply"), Mapping):
-        yield from _of_terms(data["supply"], ("supply",), ("V",))
+    for port, unit in (("supply", "V"), ("ambient", "K")):
+        if isinstance(data.get(port), Mapping):
+            yield from _of_terms(data[port], (port,), (unit,))
     initial = data.get("initial")
     for name, value in initial.items() if isinstance(initial, Mapping) else ():
         units = tuple(unit for unit in _initial_units().get(str(name), ()) if unit)

@@ -131,6 +131,7 @@ def _ports(
     ports: dict[str, tuple[str, Terms]] = {
         "command": ("command", scenario.command),
         "supply": ("supply", scenario.supply),
+        "ambient": ("ambient", scenario.ambient),
     }
     for name in type(scenario.loads).model_fields:
         ports[name] = (f"load.{name}", getattr(scenario.loads, name))

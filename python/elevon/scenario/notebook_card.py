@@ -18,7 +18,7 @@ def scenario_card(scenario: Scenario) -> Html:
     rows: list[list[object]] = [[f"command ({command.mode})", _sum(command)]]
     rows += [["", f"{step.time}: {step.action}"] for step in command.steps]
     rows += [[f"load: {name}", _sum(getattr(loads, name))] for name in type(loads).model_fields]
-    rows += [["supply", _sum(scenario.supply)]]
+    rows += [["supply", _sum(scenario.supply)], ["ambient", _sum(scenario.ambient)]]
     rows += [["fault", str(fault)] for fault in scenario.fault]
     rows += [[f"initial: {name}", value] for name, value in scenario.initial.items()]
     rows += [[f"parameter: {path}", value] for path, value in scenario.parameters.items()]

@@ -215,6 +215,9 @@ class Scenario(_Frozen):
         Key ``load`` of the file: loads on the motor shaft and the output side.
     supply : Terms
         V; when empty, the actuator file's supply voltage.
+    ambient : Terms
+        Temperature of the air, K; when empty, the actuator file's (``thermal.ambient``, of the
+        landing gear ``lubricant.temperature``). Held over 10 ms.
     fault : tuple of Fault
         What breaks. Texts of the fault grammar and tables are accepted.
     initial : mapping
@@ -241,6 +244,7 @@ class Scenario(_Frozen):
     command: Command = Command()
     loads: Load = Field(default=Load(), alias="load")
     supply: Terms = Terms()
+    ambient: Terms = Terms()
     fault: Annotated[tuple[Fault, ...], BeforeValidator(_fault_table)] = ()
     initial: Values = Field(default_factory=dict)
     parameters: Values = Field(default_factory=dict)

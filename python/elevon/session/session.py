@@ -213,14 +213,14 @@ class Session:
             return {name: table[:, column] for column, name in enumerate(names)}
         return {name: float(value) for name, value in zip(names, table[0], strict=True)}
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> object:
         return self.read(name)[name]
 
     def _ipython_key_completions_(self) -> list[str]:
         return self.names
 
     def set(self, **inputs: Value | Mapping[str, Any]) -> None:
-        """Set inputs, held from now on: ``command``, ``supply``, ``output``, ``brake``...
+        """Set inputs, held from now on: ``command``, ``supply``, ``output``, ``ambient``...
 
         Parameters
         ----------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -119,7 +118,7 @@ def texts(given: Iterable[str], place: str) -> list[str]:
     return [text(name, place) for name in given]
 
 
-def callable_or_none(given: Callable[..., Any] | None, place: str) -> None:
+def callable_or_none(given: Callable[..., object] | None, place: str) -> None:
     """Refuse what cannot be called.
 
     Raises

@@ -54,7 +54,7 @@ def sensitivities(
     record: Record = None,
     seed: int = 0,
     strict: bool = False,
-    progress: Callable[[float], Any] | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> Sensitivities:
     """Simulate one run with exact derivatives.
 

@@ -22,6 +22,7 @@ from elevon.units.quantity import (
     parse_quantity,
     shown_unit,
     si_unit,
+    split_quantity,
     to_display,
     to_si,
 )
@@ -40,6 +41,7 @@ __all__ = [
     "parse_unit",
     "shown_unit",
     "si_unit",
+    "split_quantity",
     "to_display",
     "to_si",
 ]

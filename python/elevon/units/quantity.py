@@ -23,12 +23,19 @@ __all__ = [
     "parse_quantity",
     "shown_unit",
     "si_unit",
+    "split_quantity",
     "to_display",
     "to_si",
 ]
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.,])\s*(.*?)\s*", re.S)
 _LONGEST = 100
+
+
+def split_quantity(text: str) -> tuple[str, str] | None:
+    """Return the number and the unit of a text such as ``"45 deg"``; None where it is none."""
+    match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
+    return None if match is None else (match[1], match[2])
 
 
 def parse_quantity(
@@ -73,10 +80,10 @@ def parse_quantity(
     expected = parse_unit(kind)
     if not isinstance(text, str):
         return expected.to_si(_finite(_real(text, place), place))
-    match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
-    if match is None:
+    parts = split_quantity(text)
+    if parts is None:
         raise _not_a_quantity(text, kind, place)
-    number, unit_text = match[1], match[2]
+    number, unit_text = parts
     unit = check_kind(unit_text, kind, place) if unit_text else expected
     if not unit_text and display_unit and is_ambiguous(float(number), kind, display_unit):
         raise ambiguous(number, kind, display_unit, place)

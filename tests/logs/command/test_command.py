@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from elevon.errors import InputError, UnknownNameError
+from elevon.estimate.covariance import robust_covariance
 from elevon.logs.command.fit import FREE, best_waveform, fit_waveform
 from elevon.logs.command.reconstruct import CommandTrace, reconstruct, reconstruct_from
-from elevon.logs.covariance import robust_covariance
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.importing import import_log
 from elevon.waveforms import evaluate, wave_records

@@ -6,4 +6,4 @@ pub mod rotary;
 pub mod servo;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Machine, Overheat, Port, Setup, Severity, Signals, Tick, Watch, Wiring, MAX_CHUNKS, WATCHED};
+pub use wiring::{Finding, Inputs, Machine, Overheat, Port, Setup, Severity, Signals, Tick, Watch, Wiring, HELD, MAX_CHUNKS, WATCHED};

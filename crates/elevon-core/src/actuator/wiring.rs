@@ -12,6 +12,9 @@ use std::hash::Hash;
 /// Most chunks of lanes that one thread runs side by side.
 pub const MAX_CHUNKS: usize = 4;
 
+/// Time over which a port that sets a parameter holds its value, s: short against any temperature's change.
+pub const HELD: f64 = 0.01;
+
 /// Quantities that the solver watches.
 pub const WATCHED: usize = 4;
 
@@ -147,6 +150,8 @@ pub trait Machine: Clone + Send + Sync + 'static {
     const PORTS: &'static [Port];
     /// Ports whose drive decides which equations run, and that a session may drive at any time.
     const LATE_PORTS: &'static [usize] = &[];
+    /// Ports that set their parameter: its value is held over `HELD` seconds, and all that is derived from it follows.
+    const HELD_PORTS: &'static [usize] = &[];
     /// What a command may set.
     const MODES: &'static [&'static str] = Mode::NAMES;
     /// Units of the command in each mode; empty: the command port's own.

@@ -32,6 +32,13 @@ impl SourcePlan {
         self.terms.iter().filter(|t| t.oscillates()).count()
     }
 
+    /// Value at step `k`.
+    pub fn value(&self, k: Steps, dt: f64) -> f64 {
+        let ([t, value, ..], _) = self.line(k, dt);
+        let swing = |o: Oscillation| o.amplitude * Scalar::sin_cos((o.sweep * (t - o.at) + o.rate) * (t - o.at) + o.phase).0;
+        value + self.oscillations(k, dt).map(swing).sum::<f64>()
+    }
+
     /// Parabola at step `k` as (at, value, slope, curve) and the step of the next breakpoint.
     fn line(&self, k: Steps, dt: f64) -> ([f64; 4], Steps) {
         let t = k as f64 * dt;
@@ -63,16 +70,28 @@ pub struct SourceLanes {
     oscillations: Vec<Vec<Oscillation>>,
     next: Vec<Steps>,
     soonest: Steps,
+    /// Step at which a lane was renewed last.
+    renewed: Steps,
 }
 
 impl SourceLanes {
     pub fn new(plans: Vec<SourcePlan>) -> Self {
         let n = plans.len();
-        Self { plans, lines: vec![[0.0; 4]; n], oscillations: vec![Vec::new(); n], next: vec![0; n], soonest: 0 }
+        Self { plans, lines: vec![[0.0; 4]; n], oscillations: vec![Vec::new(); n], next: vec![0; n], soonest: 0, renewed: 0 }
     }
 
     pub fn next(&self) -> Steps {
         self.soonest
+    }
+
+    /// Do all lanes keep their values up to the next breakpoint?
+    pub fn still(&self) -> bool {
+        self.lines.iter().all(|line| line[2..] == [0.0; 2]) && self.oscillations.iter().all(Vec::is_empty)
+    }
+
+    /// Step at which a lane was renewed last.
+    pub fn renewed(&self) -> Steps {
+        self.renewed
     }
 
     /// Gives a lane another plan; it acts at the next renewal.
@@ -96,6 +115,7 @@ impl SourceLanes {
             }
             self.next[lane] = next;
             renewed = true;
+            self.renewed = k;
         }
         self.soonest = self.next.iter().copied().min().unwrap_or(Steps::MAX);
         renewed
@@ -144,11 +164,31 @@ impl<S: Scalar> Source<S> {
         }
         let since = t - self.at;
         let mut sum = self.curve.fma(since, self.slope).fma(since, self.value);
-        for [at, amplitude, phase, rate, sweep] in &self.oscillators {
-            let tau = t - *at;
-            let (sin, _) = sweep.fma(tau, *rate).fma(tau, *phase).sin_cos();
-            sum = amplitude.fma(sin, sum);
+        for oscillator in &self.oscillators {
+            sum = oscillate(oscillator, t, sum);
         }
         sum
     }
+
+    /// At several instants: instant by instant in the innermost loop, which the compiler turns into vectors for a single run.
+    #[inline(always)]
+    pub fn at_each<const N: usize>(&self, t: &[S; N], out: &mut [S; N]) {
+        for (sum, &t) in out.iter_mut().zip(t) {
+            let since = t - self.at;
+            *sum = self.curve.fma(since, self.slope).fma(since, self.value);
+        }
+        for oscillator in &self.oscillators {
+            for (sum, &t) in out.iter_mut().zip(t) {
+                *sum = oscillate(oscillator, t, *sum);
+            }
+        }
+    }
+}
+
+/// Adds an oscillator at the instant `t`.
+#[inline(always)]
+fn oscillate<S: Scalar>([at, amplitude, phase, rate, sweep]: &[S; 5], t: S, sum: S) -> S {
+    let tau = t - *at;
+    let (sin, _) = sweep.fma(tau, *rate).fma(tau, *phase).sin_cos();
+    amplitude.fma(sin, sum)
 }

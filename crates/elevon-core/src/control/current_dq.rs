@@ -44,8 +44,6 @@ pub struct CurrentControlState<S> {
     pub voltage_q: S,
     /// Phase voltage references over half the supply, to be compared with the carrier.
     pub modulation: [S; 3],
-    /// When the next edge of a leg can be, in carrier periods.
-    pub next_edge: S,
     /// Those of the last sample, which act after the computation delay.
     computed: [S; 3],
 }
@@ -121,28 +119,13 @@ impl<S: Scalar> CurrentControl<S> {
 impl<S: Scalar> CurrentControlState<S> {
     pub fn initial() -> Self {
         let zero = S::zero();
-        Self {
-            integral_d: zero,
-            integral_q: zero,
-            voltage_d: zero,
-            voltage_q: zero,
-            modulation: [zero; 3],
-            next_edge: -S::splat(f64::INFINITY),
-            computed: [zero; 3],
-        }
-    }
-
-    /// What is known of the next edge does not hold any more.
-    #[inline(always)]
-    pub fn look_for_edges(&mut self) {
-        self.next_edge = S::splat(f64::NEG_INFINITY);
+        Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3], computed: [zero; 3] }
     }
 
     /// The duties computed from the last sample act from now on.
     #[inline(always)]
     pub fn update(&mut self) {
         self.modulation = self.computed;
-        self.look_for_edges();
     }
 }
 

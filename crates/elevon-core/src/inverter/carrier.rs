@@ -20,6 +20,31 @@ pub struct Carrier<S> {
     steps: S,
 }
 
+/// The edges of the legs in one period of the carrier, for references held in it; times in steps from its begin. A leg that
+/// is high all the time falls at the period's end, one that is low falls as it rises.
+#[derive(Clone, Copy, Debug)]
+pub struct Window<S> {
+    /// The period, counted from the start.
+    begin: S,
+    /// A step that ends later needs more than this window: minus infinity where the references have changed.
+    last: S,
+    rise: [S; 3],
+    fall: [S; 3],
+    /// 1; 0 where the drive has no say and no leg any command.
+    driven: S,
+    /// Edges until the window's end since the start.
+    edges: S,
+}
+
+/// What a step needs of its window.
+#[derive(Clone, Copy, Debug)]
+pub struct Span<S: Scalar> {
+    /// Begin of the step.
+    begin: S,
+    /// The steps that reach into the next period, where any does.
+    over: Option<S::Mask>,
+}
+
 /// Command of a leg over a step that is shorter than the carrier's period: it has two edges at most. Times are shares of
 /// the step; an edge that does not fall into it stands at its end.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +53,8 @@ pub struct Pulse<S: Scalar> {
     high: S::Mask,
     first: S,
     second: S,
+    /// Share of the step in which the leg is commanded high.
+    pub share: S,
 }
 
 /// Parts of a step in which the upper and the lower switch of a leg are closed; what is left of it both are open.
@@ -43,53 +70,155 @@ impl<S: Scalar> Carrier<S> {
         Self { frequency, per_step, steps: S::one() / per_step }
     }
 
-    /// Commands over the step that begins at `t`, for references held over it. Most short steps have no edge: they are known
-    /// by the instant of the next one, in carrier periods, and keep the commands of the last step's end.
+    /// The step that begins at `t`. The window is found again where the references, or whether the legs are `driven` by
+    /// them, have changed since the last step, and moves on at the end of its period.
     #[inline(always)]
-    pub fn pulses(&self, modulation: [S; 3], commands: [S; 3], next: &mut S, t: S) -> [Pulse<S>; 3] {
+    pub fn span(&self, window: &mut Window<S>, modulation: [S; 3], driven: S, t: S) -> Span<S> {
+        let one = S::one();
         let periods = t * self.frequency;
-        let end = S::splat(1.0 + SLACK).fma(self.per_step, periods);
-        if !S::any((*next).lt(end)) {
-            return three!(|j| Pulse::held(commands[j]));
+        let begin = (periods - window.begin) * self.steps;
+        if !S::any(window.last.lt(begin + one)) {
+            return Span { begin, over: None };
         }
-        let phase = periods - periods.floor();
-        let found = three!(|j| self.pulse(modulation[j], phase));
-        let first = found[0].1.minimum(found[1].1).minimum(found[2].1);
-        *next = self.per_step.fma(first, periods);
-        three!(|j| found[j].0)
+        self.look(window, modulation, driven, periods);
+        let begin = (periods - window.begin) * self.steps;
+        let over = window.last.lt(begin + one);
+        if !S::any(over) {
+            return Span { begin, over: None };
+        }
+        // The next step finds the next period.
+        window.turn(over);
+        Span { begin, over: Some(over) }
     }
 
-    /// A leg's command, and when its next edge after the step is, in steps.
+    /// The window in which a step begins.
     #[inline(always)]
-    fn pulse(&self, modulation: S, phase: S) -> (Pulse<S>, S) {
-        let (zero, one, half, quarter) = (S::zero(), S::one(), S::splat(0.5), S::splat(0.25));
-        let width = quarter.fma(modulation, quarter).clamp(zero, half);
-        let (rise, fall) = (half - width, half + width);
-        let slack = S::splat(SLACK);
-        let now = slack.fma(self.per_step, phase);
-        let (risen, fallen) = (rise.le(now), fall.le(now));
-        let (full, none) = (half.le(width), width.le(zero));
-        let high = (risen & !fallen & !none) | full;
-        let next = S::select(fallen, one + rise, S::select(risen, fall, rise));
-        let after = S::select(fallen, one + fall, S::select(risen, one + rise, fall));
-        let steady = full | none;
-        let shares = [(next - phase) * self.steps, (after - phase) * self.steps];
-        let beyond = [steady | (one - slack).lt(shares[0]), steady | (one - slack).lt(shares[1])];
-        // After two edges in a step the next one looks for more.
-        let coming = S::select(beyond[0], shares[0], S::select(beyond[1], shares[1], one));
-        let first = S::select(beyond[0], one, shares[0]);
-        let second = S::select(beyond[1], one, shares[1]);
-        (Pulse { high, first, second }, S::select(steady, S::splat(f64::MAX), coming))
+    fn look(&self, window: &mut Window<S>, modulation: [S; 3], driven: S, periods: S) {
+        let (zero, half, quarter, slack) = (S::zero(), S::splat(0.5), S::splat(0.25), S::splat(SLACK));
+        let stale = window.last.lt(zero);
+        let passed = window.begin.le(slack.fma(self.per_step, periods) - S::one());
+        if S::any(passed & !stale) {
+            window.turn(passed & !stale);
+        }
+        if !S::any(stale) {
+            return;
+        }
+        let old = (periods - window.begin) * self.steps;
+        let (ahead, before) = (window.ahead(old - slack), window.commands(old - slack));
+        let width = three!(|j| quarter.fma(modulation[j], quarter).clamp(zero, half));
+        let mut new = Window {
+            begin: slack.fma(self.per_step, periods).floor(),
+            last: self.steps + slack,
+            rise: three!(|j| (half - width[j]) * self.steps),
+            fall: three!(|j| (half + width[j]) * self.steps),
+            driven,
+            edges: window.edges - ahead,
+        };
+        let now = slack.fma(S::one(), (periods - new.begin) * self.steps);
+        let after = new.commands(now);
+        let jumps = (after[0] - before[0]).abs() + (after[1] - before[1]).abs() + (after[2] - before[2]).abs();
+        new.edges = half.fma(jumps, new.edges) + new.ahead(now);
+        window.put(stale, &new);
+    }
+
+    /// Share of a step in which a leg is commanded high.
+    #[inline(always)]
+    pub fn share(&self, window: &Window<S>, leg: usize, span: &Span<S>) -> S {
+        let end = span.begin + S::one();
+        let share = window.high(leg, end);
+        match span.over {
+            None => share,
+            Some(over) => share + S::select(over, window.high(leg, end - self.steps), S::zero()),
+        }
+    }
+
+    /// Command of a leg over a step.
+    #[inline(always)]
+    pub fn pulse(&self, window: &Window<S>, leg: usize, span: &Span<S>) -> Pulse<S> {
+        let (one, slack) = (S::one(), S::splat(SLACK));
+        let [rise, fall] = [window.rise[leg] - span.begin, window.fall[leg] - span.begin];
+        let (risen, fallen) = (rise.le(slack), fall.le(slack));
+        let next = S::select(fallen, rise + self.steps, S::select(risen, fall, rise));
+        let after = S::select(fallen, fall + self.steps, S::select(risen, rise + self.steps, fall));
+        let steady = !window.switches(leg);
+        let beyond = [steady | (one - slack).lt(next), steady | (one - slack).lt(after)];
+        Pulse {
+            high: risen & !fallen,
+            first: S::select(beyond[0], one, next),
+            second: S::select(beyond[1], one, after),
+            share: self.share(window, leg, span),
+        }
+    }
+
+    /// Edges of all legs since the start, at the instant `t`.
+    #[inline(always)]
+    pub fn edges(&self, window: &Window<S>, t: S) -> S {
+        window.edges - window.ahead((t * self.frequency - window.begin).fma(self.steps, -S::splat(SLACK)))
+    }
+}
+
+impl<S: Scalar> Window<S> {
+    /// All legs low.
+    pub fn initial() -> Self {
+        let zero = S::zero();
+        Self { begin: zero, last: -S::splat(f64::INFINITY), rise: [zero; 3], fall: [zero; 3], driven: S::one(), edges: zero }
+    }
+
+    /// The references have changed.
+    #[inline(always)]
+    pub fn renew(&mut self) {
+        self.last = -S::splat(f64::INFINITY);
+    }
+
+    /// Share of a step ending at `end` in which a leg is high in this period.
+    #[inline(always)]
+    fn high(&self, leg: usize, end: S) -> S {
+        (end - self.rise[leg]).clamp(S::zero(), S::one()) - (end - self.fall[leg]).clamp(S::zero(), S::one())
+    }
+
+    /// Does a leg switch at all?
+    #[inline(always)]
+    fn switches(&self, leg: usize) -> S::Mask {
+        S::zero().lt(self.rise[leg]) & self.rise[leg].lt(self.fall[leg])
+    }
+
+    /// Edges of the legs after `at`.
+    #[inline(always)]
+    fn ahead(&self, at: S) -> S {
+        let ahead: [S; 3] = three!(|j| {
+            let [rise, fall] = [at.lt(self.rise[j]), at.lt(self.fall[j])];
+            S::select(self.switches(j), S::indicator(rise) + S::indicator(fall), S::zero())
+        });
+        self.driven * (ahead[0] + ahead[1] + ahead[2])
+    }
+
+    /// Commands of the legs at `at`: 1 high, -1 low, 0 none.
+    #[inline(always)]
+    fn commands(&self, at: S) -> [S; 3] {
+        three!(|j| self.driven * S::select(self.rise[j].le(at) & at.lt(self.fall[j]), S::one(), -S::one()))
+    }
+
+    /// On to the next period, in some lanes.
+    #[inline(always)]
+    fn turn(&mut self, lanes: S::Mask) {
+        let edges = S::splat(2.0) * (S::indicator(self.switches(0)) + S::indicator(self.switches(1)) + S::indicator(self.switches(2)));
+        self.begin = S::select(lanes, self.begin + S::one(), self.begin);
+        self.edges = S::select(lanes, self.driven.fma(edges, self.edges), self.edges);
+    }
+
+    /// Another window, in some lanes.
+    #[inline(always)]
+    fn put(&mut self, lanes: S::Mask, new: &Self) {
+        self.begin = S::select(lanes, new.begin, self.begin);
+        self.last = S::select(lanes, new.last, self.last);
+        self.rise = three!(|j| S::select(lanes, new.rise[j], self.rise[j]));
+        self.fall = three!(|j| S::select(lanes, new.fall[j], self.fall[j]));
+        self.driven = S::select(lanes, new.driven, self.driven);
+        self.edges = S::select(lanes, new.edges, self.edges);
     }
 }
 
 impl<S: Scalar> Pulse<S> {
-    /// Without an edge.
-    #[inline(always)]
-    fn held(command: S) -> Self {
-        Self { high: S::zero().lt(command), first: S::one(), second: S::one() }
-    }
-
     /// Command at the begin and at the end of the step: 1 high, -1 low.
     #[inline(always)]
     pub fn ends(&self) -> [S; 2] {
@@ -104,13 +233,6 @@ impl<S: Scalar> Pulse<S> {
         S::indicator(self.first.lt(S::one())) + S::indicator(self.second.lt(S::one()))
     }
 
-    /// Share of the step in which the leg is commanded high.
-    #[inline(always)]
-    pub fn share(&self) -> S {
-        let between = self.second - self.first;
-        S::select(self.high, S::one() - between, between)
-    }
-
     /// Shares in which each switch conducts, after the dead time that is left over and that of the edges of this step, and
     /// what is left over after it. Dead times in steps; `before` is the command at the end of the last step.
     #[inline(always)]
@@ -122,8 +244,8 @@ impl<S: Scalar> Pulse<S> {
         let rest = one - self.second;
         // Off in the parts before, between and after the edges.
         let (outer, inner) = (left.minimum(self.first) + dead.minimum(rest), dead.minimum(between));
-        let (outside, inside) = (one - between - outer, between - inner);
-        let conduction = Conduction { upper: S::select(self.high, outside, inside), lower: S::select(self.high, inside, outside) };
+        let (upper, lower) = (S::select(self.high, outer, inner), S::select(self.high, inner, outer));
+        let conduction = Conduction { upper: self.share - upper, lower: one - self.share - lower };
         let last = S::select(self.second.lt(one), rest, one - self.first);
         let after = S::select(self.first.lt(one), dead - last, left - one);
         (conduction, after.maximum(zero))
@@ -173,18 +295,21 @@ mod tests {
                 for dead in [0.0, 0.4e-6, 3e-6, 20e-6] {
                     let steps = (500e-6 / step).round() as usize;
                     let carrier = Carrier::derive(FREQUENCY, step);
-                    let (mut command, mut left, mut next) = (-1.0, 0.0, f64::NEG_INFINITY);
+                    let (mut command, mut left, mut window) = (-1.0, 0.0, Window::initial());
                     let (mut edges, mut drawn) = (0.0, 0.0);
                     for (k, seen) in looked_at(m, step, steps, dead).into_iter().enumerate() {
-                        let [pulse, ..] = carrier.pulses([m; 3], [command; 3], &mut next, k as f64 * step);
+                        let span = carrier.span(&mut window, [m; 3], 1.0, k as f64 * step);
+                        let pulse = carrier.pulse(&window, 0, &span);
                         let case = format!("{step} {m} {dead} {k}");
-                        assert!((pulse.share() - seen.0).abs() < 2e-3, "{case}: {} {}", pulse.share(), seen.0);
+                        assert!((pulse.share - seen.0).abs() < 2e-3, "{case}: {} {}", pulse.share, seen.0);
                         let (conduction, after) = pulse.conduction(command, left, dead / step);
                         assert!((conduction.upper - seen.2).abs() < 2e-3, "{case}: {} {}", conduction.upper, seen.2);
                         edges += 0.5 * (pulse.ends()[0] - command).abs() + pulse.edges();
                         drawn += seen.1;
                         // An edge on the bound of two steps may be seen in either.
                         assert!((edges - drawn).abs() < 1.5, "{case}: {edges} {drawn}");
+                        let counted = carrier.edges(&window, (k + 1) as f64 * step);
+                        assert_eq!(counted, 3.0 * edges, "{case}");
                         command = pulse.ends()[1];
                         left = after;
                     }
@@ -200,11 +325,10 @@ mod tests {
             for m in [-0.999, -0.4, 0.0, 0.123, 0.8] {
                 let steps = (250e-6_f64 / step).round() as usize;
                 // After 1000 s, four million periods, an edge is rounded to 1e-9 of one, and m is four times that.
-                let (mut commands, mut next, mut sum) = ([-1.0; 3], f64::NEG_INFINITY, 0.0);
+                let (mut window, mut sum) = (Window::initial(), 0.0);
                 for k in 0..steps {
-                    let pulses = carrier.pulses([m; 3], commands, &mut next, (4_000_000 * steps + k) as f64 * step);
-                    commands = three!(|j| pulses[j].ends()[1]);
-                    sum += pulses[0].share();
+                    let span = carrier.span(&mut window, [m; 3], 1.0, (4_000_000 * steps + k) as f64 * step);
+                    sum += carrier.share(&window, 0, &span);
                 }
                 assert!((2.0 * sum / steps as f64 - 1.0 - m).abs() < 1e-8, "{step} {m}: {sum}");
             }

@@ -1,5 +1,6 @@
 //! Motor electromagnetics.
 
+pub mod air_gap;
 pub mod cogging;
 pub mod equivalent;
 pub mod magnetic_pull;

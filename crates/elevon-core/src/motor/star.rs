@@ -1,8 +1,10 @@
 //! Three-phase star with floating neutral, faults in the winding and the air gap included in
 //! their healthy form (T2; reference sheet 1.5).
 
+use super::air_gap::AirGap;
+use super::pole::WeakPole;
 use super::short::{Contacts, KINDS};
-use crate::scalar::Scalar;
+use crate::scalar::{three_phase, Scalar};
 use crate::three;
 use crate::variable::acts::When;
 use crate::variable::View;
@@ -11,10 +13,17 @@ use crate::{choices, variables};
 choices! {
     EmfShape { Sinusoidal "sinusoidal", Trapezoidal "trapezoidal" }
     ShortModel { Reduced "reduced", Loop "loop" }
+    EccentricityLaw { Published "published", Periodic "periodic" }
 }
 
 /// Some phase has lost turns.
 const SHORTED: When = When::Either(&[When::Away("motor.turns_a", 1.0), When::Away("motor.turns_b", 1.0), When::Away("motor.turns_c", 1.0)]);
+/// The rotor turns or stands out of centre.
+const ECCENTRIC: When = When::Either(&[
+    When::Away("motor.eccentricity_static", 0.0),
+    When::Away("motor.eccentricity_dynamic", 0.0),
+    When::Away("motor.unbalance_inertia", 0.0),
+]);
 /// The winding may leave its reference temperature.
 const WARM: When = When::Either(&[
     When::Chosen("thermal.model", &["quasi_static", "dynamic"]),
@@ -38,11 +47,13 @@ variables! {
         TurnsC => "turns_c", "N_c", "1", Fraction, Plant, Some(1.0), "healthy fraction of the turns of phase c";
         FluxFraction => "flux_fraction", "-", "1", Fraction, Plant, Some(1.0), "healthy 1; less: the magnets have lost flux";
         EccentricityStatic => "eccentricity_static", "zeta", "1", Unit, Plant, Some(0.0), "amplitude of the static eccentricity";
-        EccentricityStaticPhase => "eccentricity_static_phase", "phi", "rad", Any, Plant, Some(0.0), "its electrical phase angle",
+        EccentricityStaticPhase => "eccentricity_static_phase", "phi", "rad", Any, Plant, Some(0.0), "its phase angle: electrical in the published law, of the narrow gap round the stator in the periodic one",
             when(&[Away("motor.eccentricity_static", 0.0)]);
         EccentricityDynamic => "eccentricity_dynamic", "zeta_d", "1", Unit, Plant, Some(0.0), "dynamic eccentricity, fraction of the air gap; its modulation turns with the shaft";
         EccentricityDynamicPhase => "eccentricity_dynamic_phase", "phi_d", "rad", Any, Plant, Some(0.0), "its mechanical phase angle",
             when(&[Away("motor.eccentricity_dynamic", 0.0)]);
+        EccentricityLaw => "eccentricity_law", "-", "1", Choice(EccentricityLaw::NAMES), Plant, Some(0.0), "published: the papers' modulation of k_j, whose static part has an EMF with a mean over a turn (0.43 zeta k omega in b and c); periodic: the slope of a flux that is periodic over a turn, unequal amplitudes and a turning part",
+            when(&[ECCENTRIC]);
         OpenA => "open_a", "-", "1", Flag, Plant, Some(0.0), "1: phase a is interrupted (from its next current zero on)";
         OpenB => "open_b", "-", "1", Flag, Plant, Some(0.0), "1: phase b is interrupted (from its next current zero on)";
         OpenC => "open_c", "-", "1", Flag, Plant, Some(0.0), "1: phase c is interrupted (from its next current zero on)";
@@ -65,6 +76,7 @@ variables! {
                 Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
                 Away("motor.pole_loss", 0.0),
                 Chosen("motor.emf_shape", &["trapezoidal"]), Chosen("drive.commutation", &["six_step"]), Chosen("drive.kind", &["off"]),
+                Chosen("thermal.model", &["quasi_static", "dynamic"]),
                 Away("sensor.current.gain_a", 1.0), Away("sensor.current.gain_b", 1.0), Away("sensor.current.gain_c", 1.0),
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
             ])])]);
@@ -78,6 +90,8 @@ pub struct MotorStructure {
     pub shorted_loop: bool,
     pub static_eccentricity: bool,
     pub dynamic_eccentricity: bool,
+    /// By the law of a periodic flux.
+    pub periodic: bool,
     pub weak_pole: bool,
 }
 
@@ -89,6 +103,7 @@ impl MotorStructure {
             shorted_loop: ShortModel::read(view.value(P::ShortModel)) == ShortModel::Loop,
             static_eccentricity: view.away(P::EccentricityStatic),
             dynamic_eccentricity: view.away(P::EccentricityDynamic),
+            periodic: EccentricityLaw::read(view.value(P::EccentricityLaw)) == EccentricityLaw::Periodic,
             weak_pole: false,
         }
     }
@@ -103,9 +118,14 @@ impl MotorStructure {
         Self { weak_pole, ..self }
     }
 
+    /// Do the coefficients follow the published static law?
+    pub fn modulated(&self) -> bool {
+        self.static_eccentricity && !self.periodic
+    }
+
     /// Does it need more than the plain step? That knows the static eccentricity.
     pub fn detailed(&self) -> bool {
-        let Self { trapezoidal, shorted_loop: _, static_eccentricity: _, dynamic_eccentricity, weak_pole } = *self;
+        let Self { trapezoidal, shorted_loop: _, static_eccentricity: _, dynamic_eccentricity, periodic: _, weak_pole } = *self;
         trapezoidal || dynamic_eccentricity || weak_pole
     }
 }
@@ -131,10 +151,7 @@ pub struct Star<S> {
     pub weight: [S; 3],
     neutral_weight: [S; 3],
     torque_limit: S,
-    eccentric_cos: S,
-    eccentric_sin: S,
-    dynamic_cos: S,
-    dynamic_sin: S,
+    gap: AirGap<S>,
     flat_slope: S,
     pub open: [S; 3],
     /// Solver step over the inductance.
@@ -166,23 +183,21 @@ impl<S: Scalar> Star<S> {
         let k = g(P::EmfConstant) * g(P::FluxFraction);
         let per_inductance: [S; 3] = three!(|j| one / (turns[j] * turns[j] * g(P::WindingInductance)));
         let total = per_inductance[0] + per_inductance[1] + per_inductance[2];
-        let (sin_s, cos_s) = g(P::EccentricityStaticPhase).sin_cos();
-        let (sin_d, cos_d) = g(P::EccentricityDynamicPhase).sin_cos();
+        let gap = AirGap::derive(raw);
+        let even: [S; 3] = three!(|j| turns[j] * k);
+        let amplitude = gap.amplitudes();
         let pi = S::splat(std::f64::consts::PI);
         Self {
             pole_pairs: g(P::PolePairs),
             offset: g(P::ElectricalOffset),
-            emf_constant: three!(|j| turns[j] * k),
+            emf_constant: if structure.periodic { three!(|j| even[j] * amplitude[j]) } else { even },
             resistance: three!(|j| turns[j] * g(P::WindingResistance)),
             per_inductance,
             weight: per_inductance,
             dt_per_inductance: three!(|j| dt * per_inductance[j]),
             neutral_weight: three!(|j| per_inductance[j] / total),
             torque_limit: g(P::TorqueLimit),
-            eccentric_cos: g(P::EccentricityStatic) * cos_s,
-            eccentric_sin: g(P::EccentricityStatic) * sin_s,
-            dynamic_cos: g(P::EccentricityDynamic) * cos_d,
-            dynamic_sin: g(P::EccentricityDynamic) * sin_d,
+            gap,
             flat_slope: pi / (pi - g(P::EmfFlatWidth)),
             open: phases(raw, P::OpenA),
         }
@@ -209,10 +224,8 @@ impl<S: Scalar> Star<S> {
     }
 
     /// Adds a dynamic eccentricity.
-    pub fn add_eccentricity(&mut self, (eccentricity, phase): (S, S)) {
-        let (sin, cos) = phase.sin_cos();
-        self.dynamic_cos = self.dynamic_cos + eccentricity * cos;
-        self.dynamic_sin = self.dynamic_sin + eccentricity * sin;
+    pub fn add_eccentricity(&mut self, added: (S, S)) {
+        self.gap.add(added);
     }
 
     #[inline(always)]
@@ -220,37 +233,56 @@ impl<S: Scalar> Star<S> {
         self.pole_pairs.fma(theta, self.offset)
     }
 
-    /// As `coefficients` with an even gap.
+    /// k_j with an even gap (sheet 1.5): `shape` is f of the three phase angles.
     #[inline(always)]
     pub fn even_coefficients(&self, shape: [S; 3]) -> [S; 3] {
         three!(|j| self.emf_constant[j] * shape[j])
     }
 
-    /// k_j of the three phases (sheet 1.5): `shape` is f of the three phase angles.
+    /// k_j at a rotor position, whose electrical angle has this sine and cosine, with all that modulates them. The detailed
+    /// `flux` factor is the magnets', warm.
     #[inline(always)]
-    pub fn coefficients(&self, shape: [S; 3], gap: [S; 3]) -> [S; 3] {
-        three!(|j| self.emf_constant[j] * shape[j] * gap[j])
-    }
-
-    /// 1 + zeta cos(theta_e - phi + 2 pi (j-1)/3), the static eccentricity's modulation of phase j.
-    #[inline(always)]
-    pub fn static_gap(&self, sin: S, cos: S) -> [S; 3] {
-        let x = self.eccentric_cos.fma(cos, self.eccentric_sin * sin);
-        let y = self.eccentric_cos.fma(sin, -(self.eccentric_sin * cos));
-        let half = S::splat(-0.5) * x;
-        let root = S::splat(0.866_025_403_784_438_6) * y;
-        [S::one() + x, S::one() + (half - root), S::one() + (half + root)]
-    }
-
-    /// 1 + zeta_d cos(theta_m - phi_d - 2 pi (j-1)/3): the narrow gap sweeps the phases once a turn.
-    #[inline(always)]
-    pub fn dynamic_gap(&self, theta: S) -> [S; 3] {
-        let (sin, cos) = theta.sin_cos();
-        let x = self.dynamic_cos * cos + self.dynamic_sin * sin;
-        let y = self.dynamic_cos * sin - self.dynamic_sin * cos;
-        let half = S::splat(-0.5) * x;
-        let root = S::splat(0.866_025_403_784_438_6) * y;
-        [S::one() + x, S::one() + (half + root), S::one() + (half - root)]
+    pub fn coefficients<const FULL: bool>(
+        &self,
+        structure: &MotorStructure,
+        pole: Option<&WeakPole<S>>,
+        position: S,
+        [sin, cos]: [S; 2],
+        flux: Option<S>,
+    ) -> [S; 3] {
+        let (mut shape, across) = three_phase(sin, cos);
+        if !FULL || !(structure.detailed() || flux.is_some()) {
+            let even = self.even_coefficients(shape);
+            if !structure.modulated() {
+                return even;
+            }
+            let gap = self.gap.published(sin, cos);
+            return three!(|j| even[j] * gap[j]);
+        }
+        let mut gap = if structure.modulated() { self.gap.published(sin, cos) } else { [S::one(); 3] };
+        let angle = self.electrical_angle(position);
+        if structure.trapezoidal {
+            shape = self.trapezoid(angle);
+        }
+        let mut slope = None;
+        if structure.dynamic_eccentricity {
+            let turning = self.gap.turning(position);
+            gap = three!(|j| gap[j] * (S::one() + turning.0[j]));
+            slope = structure.periodic.then_some(turning.1);
+        }
+        if let (true, Some(pole)) = (structure.weak_pole, pole) {
+            let passing = pole.gap(position);
+            // Beside a turning flux the weak pole's own loss: a product of both would have a mean over a turn.
+            gap = if structure.periodic { three!(|j| gap[j] + (passing[j] - S::one())) } else { three!(|j| gap[j] * passing[j]) };
+        }
+        if let Some(warm) = flux {
+            gap = three!(|j| gap[j] * warm);
+        }
+        let k: [S; 3] = three!(|j| self.emf_constant[j] * shape[j] * gap[j]);
+        let Some(slope) = slope else { return k };
+        let linked = if structure.trapezoidal { self.trapezoid_flux(angle) } else { three!(|j| -across[j]) };
+        let share = self.gap.per_pole_pairs * flux.unwrap_or(S::one());
+        three!(|j| (self.emf_constant[j] * linked[j] * slope[j]).fma(share, k[j]))
     }
 
     /// Trapezoid of the three phase angles theta_e - 2 pi (j-1)/3: a triangle cut at +-1.
@@ -260,6 +292,23 @@ impl<S: Scalar> Star<S> {
             let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0) + S::splat(0.25);
             let triangle = S::one() - S::splat(4.0) * (turns - turns.floor() - S::splat(0.5)).abs();
             (triangle * self.flat_slope).clamp_abs(S::one())
+        })
+    }
+
+    /// F of the three phase angles, whose slope is the trapezoid: parabolas round its peaks, where the trapezoid crosses zero.
+    #[inline(always)]
+    pub fn trapezoid_flux(&self, angle: S) -> [S; 3] {
+        let (half, quarter_turn) = (S::splat(0.5), S::splat(std::f64::consts::FRAC_PI_2));
+        let width = quarter_turn / self.flat_slope;
+        let peak = quarter_turn - half * width;
+        three!(|j| {
+            let turns = angle * S::splat(1.0 / std::f64::consts::TAU) - S::splat(j as f64 / 3.0) + half;
+            // 1 where the trapezoid rises through zero, -1 where it falls.
+            let triangle = S::one() - S::splat(4.0) * (turns - turns.floor() - half).abs();
+            let distance = (S::one() - triangle.abs()) * quarter_turn;
+            let inside = distance.minimum(width);
+            let drop = half * inside * inside / width + (distance - inside);
+            -triangle.signed(peak - drop)
         })
     }
 

@@ -68,6 +68,12 @@ pub struct NetworkState<S> {
     pub surface: S,
     /// Heat of the phases, of shorted turns and of contacts in the winding since the last tick, J.
     pub collected: [S; 3],
+    /// What of it is known to be heat of one phase's copper, J; the rest is even.
+    pub windings: [S; 3],
+    /// Each phase's temperature above the winding's, K.
+    apart: [S; 3],
+    /// Heat of the phase that has most, mean of the last tick, W.
+    pub hottest: S,
     /// Mean of the last tick, W: phases, shorted turns, contacts, given to the air.
     pub power: [S; 4],
     /// Since the start, J.
@@ -120,12 +126,30 @@ impl<S: Scalar> Network<S> {
             winding,
             surface,
             collected: [zero; 3],
+            windings: [zero; 3],
+            apart: [zero; 3],
+            hottest: zero,
             power: [zero; 4],
             heat_in: zero,
             heat_out: zero,
             begin: [winding, surface],
             over: zero,
         }
+    }
+
+    /// Temperature of the housing, and so of what it holds: the air's without a network.
+    #[inline(always)]
+    pub fn housing(&self, network: bool, s: &NetworkState<S>) -> S {
+        if network {
+            s.surface
+        } else {
+            self.ambient
+        }
+    }
+
+    /// The air's.
+    pub fn air(&self) -> S {
+        self.ambient
     }
 
     /// Heat to the air at a surface temperature, W.
@@ -165,9 +189,27 @@ impl<S: Scalar> Network<S> {
         s.winding = s.winding + gain * (power - through);
         let capacity = S::select(quasi, S::one(), self.housing_capacity);
         s.surface = S::select(quasi, surface, s.surface + self.period / capacity * (through - out));
+        self.part_phases(s, power, gain);
         s.collected = [zero; 3];
         s.power = [copper, loops, contact, out];
         s.over = S::select(self.trip.lt(s.winding), S::one(), s.over);
+    }
+
+    /// Each phase is a third of the winding with three times its resistance to the surface, none to the others: the mean of
+    /// the three is the winding's own node, what they differ by decays with its time constant.
+    fn part_phases(&self, s: &mut NetworkState<S>, power: S, gain: S) {
+        let (third, three) = (S::splat(1.0 / 3.0), S::splat(3.0));
+        let mean = third * (s.windings[0] + s.windings[1] + s.windings[2]);
+        let above: [S; 3] = three!(|j| (s.windings[j] - mean) / self.period);
+        let per = S::one() / (S::one() + gain / self.resistance);
+        s.apart = three!(|j| per * (three * gain).fma(above[j], s.apart[j]));
+        s.hottest = third.fma(power, above[0].maximum(above[1]).maximum(above[2]));
+        s.windings = [S::zero(); 3];
+    }
+
+    /// Temperature of the hottest phase.
+    pub fn hottest(&self, s: &NetworkState<S>) -> S {
+        s.winding + s.apart[0].maximum(s.apart[1]).maximum(s.apart[2])
     }
 
     /// Factors on the winding's resistance (its own temperature) and on the flux (the surface's).

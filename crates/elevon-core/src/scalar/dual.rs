@@ -157,6 +157,15 @@ impl<V: Scalar> Scalar for Dual<V> {
         (Self::splat(nearest), quarters)
     }
     #[inline(always)]
+    fn power_of_two(whole: u64) -> Self {
+        Self::splat(f64::power_of_two(whole))
+    }
+    #[inline(always)]
+    fn decay(self) -> Self {
+        let value = trig::decay(self.value);
+        self.chain(value, -value)
+    }
+    #[inline(always)]
     fn turn(sin: Self, cos: Self, quarters: u64) -> (Self, Self) {
         let (s, c) = if quarters & 1 != 0 { (cos, sin) } else { (sin, cos) };
         let s = if quarters & 2 != 0 { -s } else { s };

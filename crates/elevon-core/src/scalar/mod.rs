@@ -85,6 +85,13 @@ pub trait Scalar:
     fn powf(self, exponent: f64) -> Self;
     /// Nearest integer (ties to even) as a number and as quarter turns; for magnitudes below 2^51.
     fn quarters(self) -> (Self, Self::Quarters);
+    /// Two to the power of a whole number, as `quarters` gives it; above -1022.
+    fn power_of_two(whole: Self::Quarters) -> Self;
+    /// exp(-x) for x from zero on by our own polynomial: the same bits on every platform and lane width, zero beyond 700.
+    #[inline(always)]
+    fn decay(self) -> Self {
+        trig::decay(self)
+    }
     /// Sine and cosine of an angle turned by quarter turns.
     fn turn(sin: Self, cos: Self, quarters: Self::Quarters) -> (Self, Self);
     /// Sine and cosine by our own polynomials: the same bits on every platform and lane width.
@@ -123,8 +130,7 @@ pub trait Scalar:
     /// `self` held inside `[low, high]`.
     #[inline(always)]
     fn clamp(self, low: Self, high: Self) -> Self {
-        let upper = Self::select(high.lt(self), high, self);
-        Self::select(upper.lt(low), low, upper)
+        self.minimum(high).maximum(low)
     }
     /// `self` held inside `[-limit, limit]`.
     #[inline(always)]

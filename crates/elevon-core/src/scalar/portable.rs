@@ -125,6 +125,10 @@ impl<const N: usize> Scalar for Portable<N> {
         (Self(both.map(|b| b.0)), both.map(|b| b.1))
     }
     #[inline(always)]
+    fn power_of_two(whole: [u64; N]) -> Self {
+        Self(whole.map(f64::power_of_two))
+    }
+    #[inline(always)]
     fn turn(sin: Self, cos: Self, quarters: [u64; N]) -> (Self, Self) {
         let both: [(f64, f64); N] = std::array::from_fn(|i| f64::turn(sin.0[i], cos.0[i], quarters[i]));
         (Self(both.map(|b| b.0)), Self(both.map(|b| b.1)))

@@ -80,6 +80,10 @@ impl Scalar for f64 {
         (shifted - ROUNDER, shifted.to_bits())
     }
     #[inline(always)]
+    fn power_of_two(whole: u64) -> Self {
+        f64::from_bits(whole.wrapping_add(1023) << 52)
+    }
+    #[inline(always)]
     fn turn(sin: Self, cos: Self, quarters: u64) -> (Self, Self) {
         let (s, c) = if quarters & 1 != 0 { (cos, sin) } else { (sin, cos) };
         let sin_sign = (quarters & 2) << 62;

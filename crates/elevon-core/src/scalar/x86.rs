@@ -54,11 +54,29 @@ unsafe fn signs_avx512(quarters: __m512i) -> (Avx512Mask, __m512d, __m512d) {
     (Avx512Mask(_mm512_movepi64_mask(odd)), _mm512_castsi512_pd(sin_sign), _mm512_castsi512_pd(cos_sign))
 }
 
+/// Two to the power of whole numbers in the low bits: their sum with the exponent's bias, in the exponent's place.
+///
+/// # Safety
+/// The processor must have AVX2.
+#[inline(always)]
+unsafe fn power_avx2(whole: __m256i) -> __m256d {
+    _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_add_epi64(whole, _mm256_set1_epi64x(1023))))
+}
+
+/// As `power_avx2`.
+///
+/// # Safety
+/// The processor must have AVX-512 F.
+#[inline(always)]
+unsafe fn power_avx512(whole: __m512i) -> __m512d {
+    _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_add_epi64(whole, _mm512_set1_epi64(1023))))
+}
+
 macro_rules! vector_type {
     ($name:ident, $mask:ident, $lanes:literal, $align:literal, $register:ty,
      $add:ident, $sub:ident, $mul:ident, $div:ident, $splat:ident, $load:ident, $store:ident,
-     $sqrt:ident, $fma:ident, $with:ident,
-     $integers:ty, $to_bits:ident, $signs:ident, $xor:ident) => {
+     $sqrt:ident, $minimum:ident, $maximum:ident, $fma:ident, $with:ident,
+     $integers:ty, $to_bits:ident, $power:ident, $signs:ident, $xor:ident) => {
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
         pub struct $name($register);
@@ -165,6 +183,17 @@ macro_rules! vector_type {
                 // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 Self(unsafe { $fma(self.0, factor.0, addend.0) })
             }
+            /// The instruction gives its second operand where they are equal or not numbers: `self`, as a selection does.
+            #[inline(always)]
+            fn minimum(self, o: Self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
+                Self(unsafe { $minimum(o.0, self.0) })
+            }
+            #[inline(always)]
+            fn maximum(self, o: Self) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
+                Self(unsafe { $maximum(o.0, self.0) })
+            }
             #[inline(always)]
             fn abs(self) -> Self {
                 self.absolute()
@@ -193,6 +222,11 @@ macro_rules! vector_type {
                 let shifted = self + Self::splat(ROUNDER);
                 // SAFETY: this type exists only where the processor has its instructions (head of this file).
                 (shifted - Self::splat(ROUNDER), unsafe { $to_bits(shifted.0) })
+            }
+            #[inline(always)]
+            fn power_of_two(whole: $integers) -> Self {
+                // SAFETY: this type exists only where the processor has its instructions (head of this file).
+                Self(unsafe { $power(whole) })
             }
             #[inline(always)]
             fn turn(sin: Self, cos: Self, quarters: $integers) -> (Self, Self) {
@@ -225,10 +259,13 @@ vector_type!(
     _mm256_loadu_pd,
     _mm256_storeu_pd,
     _mm256_sqrt_pd,
+    _mm256_min_pd,
+    _mm256_max_pd,
     _mm256_fmadd_pd,
     with_avx2,
     __m256i,
     _mm256_castpd_si256,
+    power_avx2,
     signs_avx2,
     _mm256_xor_pd
 );
@@ -246,10 +283,13 @@ vector_type!(
     _mm512_loadu_pd,
     _mm512_storeu_pd,
     _mm512_sqrt_pd,
+    _mm512_min_pd,
+    _mm512_max_pd,
     _mm512_fmadd_pd,
     with_avx512,
     __m512i,
     _mm512_castpd_si512,
+    power_avx512,
     signs_avx512,
     _mm512_xor_pd
 );

@@ -1,4 +1,8 @@
 //! Incremental encoder driven through a wheel pair (reference sheet 1.1: 5000 pulses, x4, wheels 22:88).
+//!
+//! Its edges are read off a sine and a cosine of one period a pulse. Offsets of these signals shift the position by a first, unequal
+//! amplitudes and a phase error by a second harmonic of the period: x + T (e_1 sin(z + phi_1) + e_2 sin(2 z + phi_2)), z = 2 pi x/T,
+//! is what the counter counts.
 
 use crate::scalar::Scalar;
 use crate::variable::View;
@@ -18,6 +22,12 @@ variables! {
             when(&[Away("sensor.encoder.dark_share", 0.0)]);
         DarkPosition => "encoder.dark_position", "-", "rad", Any, Sensor, Some(0.0), "angle of the disc at the middle of a dark sector",
             when(&[Away("sensor.encoder.dark_share", 0.0)]);
+        FirstHarmonic => "encoder.first_harmonic", "e_1", "1", Between(-0.5, 0.5), Sensor, Some(0.0), "healthy 0; interpolation error at the period of the pulses over that period: offsets of the encoder's signals; makers state 0.01 of the period for both harmonics together (ASSUMED typical)";
+        FirstPhase => "encoder.first_phase", "phi_1", "rad", Any, Sensor, Some(0.0), "phase of it where the output stands at zero",
+            when(&[Away("sensor.encoder.first_harmonic", 0.0)]);
+        SecondHarmonic => "encoder.second_harmonic", "e_2", "1", Between(-0.5, 0.5), Sensor, Some(0.0), "healthy 0; interpolation error at half the period of the pulses over that period: unequal amplitudes or a phase error of the encoder's signals";
+        SecondPhase => "encoder.second_phase", "phi_2", "rad", Any, Sensor, Some(0.0), "phase of it where the output stands at zero",
+            when(&[Away("sensor.encoder.second_harmonic", 0.0)]);
         Dead => "encoder.dead", "-", "1", Flag, Sensor, Some(0.0), "1: no counts come at all";
         Stuck => "encoder.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the reported position stands still at its last value while the counter goes on";
     }
@@ -28,6 +38,11 @@ pub struct Encoder<S> {
     per_count: S,
     count: S,
     offset: S,
+    /// Periods of the signals per unit of output travel, and size of one.
+    per_period: S,
+    period: S,
+    /// Interpolation error: amplitudes over the period and phases.
+    harmonics: [[S; 2]; 2],
     /// Dark sectors per unit of output travel, and where the first lies.
     sectors: S,
     first: S,
@@ -50,18 +65,23 @@ pub struct EncoderState<S> {
 }
 
 impl<S: Scalar> Encoder<S> {
-    /// `turn` is the output travel over which the pulses are counted: 2 pi rad, or 1 m of a linear scale.
-    pub fn derive(raw: &[S], turn: f64) -> Self {
+    /// `turn` is the output travel over which the pulses are counted: 2 pi rad, or 1 m of a `scale`, whose ratio is not that of wheels
+    /// but an interpolation between the pulses.
+    pub fn derive(raw: &[S], turn: f64, scale: bool) -> Self {
         use EncoderParameter as P;
         let g = |p: P| raw[p as usize];
         let counts = g(P::Pulses) * g(P::Edges) * g(P::WheelRatio);
         let tau = S::splat(turn);
         let kept = S::one() - g(P::MissingCounts);
         let sectors = g(P::DarkSectors).floor();
+        let periods = if scale { g(P::Pulses) } else { g(P::Pulses) * g(P::WheelRatio) };
         Self {
             per_count: counts / tau * kept,
             count: g(P::Gain) * tau / counts,
             offset: g(P::Offset),
+            per_period: periods / tau,
+            period: tau / periods,
+            harmonics: [[g(P::FirstHarmonic), g(P::FirstPhase)], [g(P::SecondHarmonic), g(P::SecondPhase)]],
             sectors: sectors * g(P::WheelRatio) / tau,
             first: sectors * g(P::DarkPosition) * S::splat(1.0 / std::f64::consts::TAU),
             share: g(P::DarkShare),
@@ -74,6 +94,21 @@ impl<S: Scalar> Encoder<S> {
     /// Does it ever lose counts, or stand still?
     pub fn loses(view: &View<EncoderParameter>) -> bool {
         view.any_away([EncoderParameter::DarkShare, EncoderParameter::Dead, EncoderParameter::Stuck])
+    }
+
+    /// Does its interpolation err?
+    pub fn errs(view: &View<EncoderParameter>) -> bool {
+        view.any_away([EncoderParameter::FirstHarmonic, EncoderParameter::SecondHarmonic])
+    }
+
+    /// The output position that the signals show.
+    #[inline(always)]
+    pub fn interpolated(&self, output: S) -> S {
+        let [[first, phase], [second, other]] = self.harmonics;
+        let angle = S::splat(std::f64::consts::TAU) * (output * self.per_period);
+        let (sin, _) = (angle + phase).sin_cos();
+        let (twice, _) = (angle + angle + other).sin_cos();
+        output + self.period * (first * sin + second * twice)
     }
 
     pub fn start(&self, output: S) -> EncoderState<S> {
@@ -123,7 +158,7 @@ mod tests {
         for &(p, value) in changed {
             raw[p as usize] = value;
         }
-        Encoder::derive(&raw, TAU)
+        Encoder::derive(&raw, TAU, false)
     }
 
     /// Reading after moving in small steps through the given output positions.
@@ -142,6 +177,25 @@ mod tests {
             e.advance(output, &mut s);
             assert_eq!(s.reading, e.read(output));
         }
+    }
+
+    #[test]
+    fn the_interpolation_error_has_two_harmonics_of_the_period() {
+        let e = encoder(&[(P::FirstHarmonic, 0.02), (P::FirstPhase, 0.4), (P::SecondHarmonic, 0.01), (P::SecondPhase, -0.7)]);
+        let period = TAU / (5000.0 * 4.0);
+        for k in 0..40 {
+            let output = 0.3 + period * 0.11 * f64::from(k);
+            let angle = TAU * output / period;
+            let error = period * (0.02 * (angle + 0.4).sin() + 0.01 * (2.0 * angle - 0.7).sin());
+            assert!((e.interpolated(output) - output - error).abs() < 1e-12);
+        }
+        let whole = encoder(&[]);
+        assert_eq!(whole.interpolated(0.37), 0.37);
+        let mut raw: Vec<f64> = ENCODER.iter().map(|v| v.default.unwrap_or(0.0)).collect();
+        raw[P::FirstHarmonic as usize] = 0.02;
+        // A scale's period is that of its pulses, whatever their interpolation.
+        let shown = Encoder::<f64>::derive(&raw, 1.0, true).interpolated(0.3 / 5000.0);
+        assert!((shown * 5000.0 - 0.3 - 0.02 * (0.3 * TAU).sin()).abs() < 1e-12);
     }
 
     #[test]

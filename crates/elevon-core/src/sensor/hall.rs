@@ -38,6 +38,8 @@ pub struct Hall<S> {
 #[derive(Clone, Copy, Debug)]
 pub struct HallState<S> {
     pub code: [S; 3],
+    /// The last code that a position has: an edge leads from it to the next such code.
+    valid: [S; 3],
     last_edge: S,
     speed: S,
     direction: S,
@@ -80,7 +82,8 @@ impl<S: Scalar> Hall<S> {
 
     pub fn start(&self, angle: S) -> HallState<S> {
         let zero = S::zero();
-        HallState { code: self.code(angle), last_edge: S::splat(-1e9), speed: zero, direction: zero, count: zero, errors: zero }
+        let code = self.code(angle);
+        HallState { code, valid: code, last_edge: S::splat(-1e9), speed: zero, direction: zero, count: zero, errors: zero }
     }
 
     /// Takes the code after a step of `dt` that ended at time `t` and at `angle`, having advanced by `advance`.
@@ -93,29 +96,36 @@ impl<S: Scalar> Hall<S> {
         }
     }
 
-    /// Two codes are vectors 60 degrees apart when one sector follows the other, and shorter than one when invalid.
+    /// Two codes are vectors 60 degrees apart when one sector follows the other. A code that no position has (all high, all
+    /// low) is an error and no edge: what follows it is compared with the last code before it, and an edge that passed
+    /// meanwhile tells the direction but not when it passed, so the speed stays as it was.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     fn edge(&self, s: &mut HallState<S>, code: [S; 3], same: S::Mask, angle: S, advance: S, t: S, dt: S) {
         let zero = S::zero();
-        let ((x0, y0), (x1, y1)) = (vector(s.code), vector(code));
-        let neighbours = S::splat(0.25).lt(x0 * x1 + y0 * y1);
-        let step = !same & neighbours;
+        let one = S::one();
+        let ((x0, y0), (x1, y1)) = (vector(s.valid), vector(code));
+        let valid = S::splat(0.5).lt(x1 * x1 + y1 * y1);
+        let blind = (zero.equals(s.code[0] + s.code[1] + s.code[2])) | S::splat(2.5).lt(s.code[0] + s.code[1] + s.code[2]);
+        let cosine = x0 * x1 + y0 * y1;
+        let returned = valid & S::splat(0.75).lt(cosine);
+        let step = !same & valid & S::splat(0.25).lt(cosine) & !returned;
         let direction = (x0 * y1 - y0 * x1).sign();
         // When the edge passed, within the step.
         let place = (angle + self.offset) * S::splat(6.0 * PER_TURN) - S::splat(0.5);
         let beyond = place - place.floor();
-        let travelled = S::select(zero.lt(advance), beyond, S::one() - beyond);
-        let share = (travelled / (advance.abs() * S::splat(6.0 * PER_TURN)).maximum(S::splat(1e-300))).minimum(S::one());
+        let travelled = S::select(zero.lt(advance), beyond, one - beyond);
+        let share = (travelled / (advance.abs() * S::splat(6.0 * PER_TURN)).maximum(S::splat(1e-300))).minimum(one);
         let edge = t - share * dt;
         let since = (edge - s.last_edge).maximum(S::splat(1e-9));
         let steady = direction.equals(s.direction);
-        let speed = S::select(steady, direction * self.pitch / since, zero);
-        s.speed = S::select(step, speed, s.speed);
+        let measured = S::select(steady, direction * self.pitch / since, zero);
+        s.speed = S::select(step & !blind, measured, s.speed);
         s.direction = S::select(step, direction, s.direction);
         s.count = s.count + S::select(step, direction, zero);
-        s.errors = s.errors + S::select(!same & !neighbours, S::one(), zero);
-        s.last_edge = S::select(!same, edge, s.last_edge);
+        s.errors = s.errors + S::select(!same & !step & !returned, one, zero);
+        s.last_edge = S::select(!same & valid & !returned, edge, s.last_edge);
+        s.valid = three!(|j| S::select(!same & valid, code[j], s.valid[j]));
         s.code = three!(|j| S::select(same, s.code[j], code[j]));
     }
 

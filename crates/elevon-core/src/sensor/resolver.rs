@@ -1,8 +1,11 @@
 //! Motor resolver: commutation angle, motor position and, through its converter, motor speed (N 4.5).
 //!
-//! Channel mismatch scales the sine channel: the reported angle is atan2(g sin, cos). Shorted turns of a secondary winding do
-//! the same to its channel, an open one leaves a residue; the converter divides the channels, so that a weaker excitation
-//! turns no angle. Without power, or with too little signal, it reports a shaft at rest: the last angle or zero, no speed.
+//! The converter reports atan2(y, x) of its channels y = a sin(theta) + o_s, x = b cos(theta + delta) + o_c. Channel mismatch and
+//! shorted turns lower an amplitude, an open winding leaves a residue; delta is the quadrature error of windings that do not stand
+//! at a right angle, o_s and o_c are offsets of the demodulated channels. To first order the angle errs by
+//! (a - b)/2 sin(2 theta) + delta/2 (1 - cos(2 theta)) + o_s cos(theta) - o_c sin(theta). The converter divides the channels, so
+//! that a weaker excitation turns no angle (and weighs the offsets more). Without power, or with too little signal, it reports a
+//! shaft at rest: the last angle or zero, no speed.
 
 use crate::scalar::Scalar;
 use crate::variable::View;
@@ -42,8 +45,12 @@ variables! {
         TrackingLimit => "resolver.tracking_limit", "-", "rad/s", Positive, Sensor, Some(6_283.185_307_179_586), "largest speed the converter reports; ASSUMED: 1000 turns/s, a common converter of 12 bits",
             when(&[Either(&[
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0),
-                Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0),
+                Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0), Away("sensor.resolver.quadrature", 0.0),
+                Away("sensor.resolver.sine_offset", 0.0), Away("sensor.resolver.cosine_offset", 0.0),
             ])]);
+        Quadrature => "resolver.quadrature", "delta", "rad", Between(-0.3, 0.3), Sensor, Some(0.0), "healthy 0; angle by which the cosine winding deviates from its right angle to the sine winding: the reported angle errs by half of it in the mean and at twice the shaft frequency";
+        SineOffset => "resolver.sine_offset", "o_s", "1", Between(-0.2, 0.2), Sensor, Some(0.0), "healthy 0; offset of the demodulated sine channel over its healthy amplitude: the reported angle errs once a turn of the shaft";
+        CosineOffset => "resolver.cosine_offset", "o_c", "1", Between(-0.2, 0.2), Sensor, Some(0.0), "healthy 0; offset of the demodulated cosine channel over its healthy amplitude: the reported angle errs once a turn of the shaft";
         Stuck => "resolver.stuck", "-", "1", Flag, Sensor, Some(0.0), "1: the converter's reading stands still at its last value, angle and speed";
         NoiseDeviation => "resolver.noise_deviation", "-", "rad", NonNegative, Sensor, Some(0.0), "standard deviation of the noise of the reported motor angle",
             high_only("its step is longer than the noise's band");
@@ -61,6 +68,10 @@ pub struct Resolver<S> {
     gain_less: S,
     sine: S,
     cosine: S,
+    /// Of the channels, sine and cosine, over the present excitation.
+    offsets: [S; 2],
+    /// 1 - cos, sine and cosine of the quadrature error.
+    skew: [S; 3],
     /// Of the excitation; none without power.
     amplitude: S,
     offset: S,
@@ -101,10 +112,13 @@ impl<S: Scalar> Resolver<S> {
         let (sine, cosine) = (one - sine_lost, one - cosine_lost);
         let signal = (one - g(P::ExcitationShort)) * sine.maximum(cosine);
         let off = half.le(g(P::PowerOff)) | signal.lt(g(P::LeastSignal));
+        let (skew_sin, skew_cos) = g(P::Quadrature).sin_cos();
         Self {
             gain_less: cosine_lost - sine_lost,
             sine,
             cosine,
+            offsets: [P::SineOffset, P::CosineOffset].map(|p| g(p) / (one - g(P::ExcitationShort))),
+            skew: [one - skew_cos, skew_sin, skew_cos],
             amplitude: S::select(half.le(g(P::PowerOff)), S::zero(), one - g(P::ExcitationShort)),
             offset: g(P::Offset),
             gain: g(P::Gain),
@@ -135,7 +149,8 @@ impl<S: Scalar> Resolver<S> {
     /// Can it report another angle than the shaft's?
     pub fn needed(view: &View<ResolverParameter>) -> bool {
         use ResolverParameter as P;
-        view.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff, P::Stuck]) || Self::signal_fails(view)
+        view.any_away([P::Mismatch, P::Offset, P::Gain, P::PowerOff, P::Stuck, P::Quadrature, P::SineOffset, P::CosineOffset])
+            || Self::signal_fails(view)
     }
 
     /// Is there noise?
@@ -176,8 +191,36 @@ impl<S: Scalar> Resolver<S> {
     #[inline(always)]
     pub fn signal(&self, theta: S) -> S {
         let (sin, cos) = theta.sin_cos();
-        let (sine, cosine) = (self.sine * sin, self.cosine * cos);
+        let (sine, cosine) = (self.sine * sin + self.offsets[0], self.cosine * cos + self.displaced(sin, cos));
         self.amplitude * (sine * sine + cosine * cosine).sqrt()
+    }
+
+    /// How far offsets and quadrature error move the channels' ellipse at most, and the amplitude of the weaker one: the ellipse
+    /// holds its centre while the first is less.
+    pub fn eccentricity(&self) -> (S, S) {
+        let [sine, cosine] = self.offsets;
+        let skewed = self.cosine * (self.skew[0] + S::splat(0.5) * self.skew[1].abs());
+        ((sine * sine + cosine * cosine).sqrt() + skewed, self.sine.minimum(self.cosine))
+    }
+
+    /// What quadrature error and offset add to the cosine channel.
+    #[inline(always)]
+    fn displaced(&self, sin: S, cos: S) -> S {
+        self.offsets[1] - self.cosine * (cos * self.skew[0] + sin * self.skew[1])
+    }
+
+    /// Has any channel an offset, or an axis of its own?
+    #[inline(always)]
+    fn displaced_ever(&self) -> S::Mask {
+        let zero = S::zero();
+        !(self.offsets[0].equals(zero) & self.offsets[1].equals(zero) & self.skew[1].equals(zero))
+    }
+
+    /// Bound of the first-order error of the angle, rad, and the relative error of position and speed.
+    pub fn errors(&self) -> S {
+        let [sine, cosine] = self.offsets;
+        let turned = S::splat(0.5) * self.gain_less.abs() + self.skew[1].abs() + sine.abs() + cosine.abs() + self.offset.abs();
+        turned.maximum((self.gain - S::one()).abs())
     }
 
     /// Change of the reported speed over that of the shaft's: none without power or while it stands still.
@@ -193,16 +236,33 @@ impl<S: Scalar> Resolver<S> {
         let half = S::splat(0.5);
         let (off, stuck) = (half.le(self.off), half.le(self.stuck));
         let (sin, cos) = theta.sin_cos();
-        // atan2(a s, b c) = theta + atan2((a - b) s c, b c^2 + a s^2): unwrapped, and exact.
+        // atan2(a s + p, b c + q) = theta + atan2((a - b) s c + p c - q s, b c^2 + a s^2 + p s + q c): unwrapped, and exact.
         let (ss, cc) = (sin * sin, cos * cos);
-        let error = S::atan2_right(self.gain_less * sin * cos, self.cosine * cc + self.sine * ss);
-        // d/dt atan2(a s, b c) = omega a b / (b^2 c^2 + a^2 s^2): the converter tracks what it reports.
+        let mut across = self.gain_less * sin * cos;
+        let mut along = self.cosine * cc + self.sine * ss;
+        // Its derivative is omega (x dy - y dx) / (x^2 + y^2): the converter tracks what it reports.
+        let mut turned = self.sine * self.cosine;
+        let mut size = self.cosine * self.cosine * cc + self.sine * self.sine * ss;
         // Alike channels change no bit.
-        let alike = self.gain_less.equals(S::zero());
-        let tracked = self.sine * self.cosine / (self.cosine * self.cosine * cc + self.sine * self.sine * ss);
-        let reading = theta + error + self.offset;
-        let rate = S::anchor(alike, S::one(), tracked);
+        let mut alike = self.gain_less.equals(S::zero());
+        if !S::FORMS || S::any(self.displaced_ever()) {
+            let (p, q) = (self.offsets[0], self.displaced(sin, cos));
+            across = across + (p * cos - q * sin);
+            along = along + (p * sin + q * cos);
+            alike = alike & p.equals(S::zero()) & q.equals(S::zero());
+            let [_, skew_sin, skew_cos] = self.skew;
+            let added = self.offsets[1] * self.sine * cos + p * self.cosine * (sin * skew_cos + cos * skew_sin);
+            turned = turned * skew_cos + added;
+            let two = S::splat(2.0);
+            size = size + (q * (two * self.cosine * cos + q) + p * (two * self.sine * sin + p));
+        }
+        let reading = theta + S::atan2_right(across, along) + self.offset;
+        let rate = S::anchor(alike, S::one(), turned / size);
         let turning = S::select(off, S::zero(), (omega * rate).clamp_abs(self.tracking_limit));
+        if !S::any(off | stuck) {
+            *memory = ResolverState { angle: reading, speed: turning };
+            return Reading { angle: reading, position: self.gain * reading, speed: self.gain * turning };
+        }
         memory.angle = S::select(off | stuck, memory.angle, reading);
         memory.speed = S::select(stuck, memory.speed, turning);
         let lost = S::select(half.lt(self.zero_when_off), S::zero(), memory.angle);
@@ -240,6 +300,41 @@ mod tests {
                 assert!((reading.speed - ahead / 1e-6).abs() < 1e-8);
             }
         }
+    }
+
+    #[test]
+    fn offsets_and_quadrature_show_the_angle_of_the_channels_and_their_harmonics() {
+        let shown = [(P::SineOffset, 0.02), (P::CosineOffset, -0.03), (P::Quadrature, 0.01), (P::Mismatch, 0.1)];
+        let r = resolver(&shown);
+        for k in -20..20 {
+            let theta = 0.31 * f64::from(k);
+            let reading = r.read(theta, 2.0, &mut fresh());
+            let channels = (0.9 * theta.sin() + 0.02).atan2((theta + 0.01).cos() - 0.03);
+            assert!(libm::remainder(reading.angle - channels, 2.0 * PI).abs() < 1e-13, "{theta}");
+            let ahead = r.read(theta + 1e-6, 2.0, &mut fresh()).angle - r.read(theta - 1e-6, 2.0, &mut fresh()).angle;
+            assert!((reading.speed - ahead / 1e-6).abs() < 1e-7);
+            let size = (0.9 * theta.sin() + 0.02).hypot((theta + 0.01).cos() - 0.03);
+            assert!((r.signal(theta) - size).abs() < 1e-15);
+        }
+        // To first order, each alone; what is left is of second order.
+        for (p, value) in [(P::SineOffset, 1e-4), (P::CosineOffset, 1e-4), (P::Quadrature, 1e-4)] {
+            for theta in [-2.0_f64, 0.4, 1.3] {
+                let error = resolver(&[(p, value)]).read(theta, 1.0, &mut fresh()).angle - theta;
+                let first = match p {
+                    P::SineOffset => theta.cos(),
+                    P::CosineOffset => -theta.sin(),
+                    _ => 0.5 * (1.0 - (2.0 * theta).cos()),
+                };
+                assert!((error - value * first).abs() < 2e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn a_weaker_excitation_weighs_the_offsets_more() {
+        let weak = [(P::ExcitationShort, 0.2), (P::SineOffset, 0.02)];
+        let error = resolver(&weak).read(0.0, 1.0, &mut fresh()).angle;
+        assert!((error - 0.025_f64.atan()).abs() < 1e-14);
     }
 
     #[test]

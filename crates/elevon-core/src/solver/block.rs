@@ -4,8 +4,8 @@ use super::batch::Monitor;
 use super::kernels::{Advance, Lift, Observe, Record, Ticking};
 use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
-use crate::actuator::{Inputs, Setup, Signals, Tick, Wiring};
-use crate::command::{Source, SourceLanes};
+use crate::actuator::{Inputs, Machine, Setup, Signals, Tick, Wiring, HELD};
+use crate::command::{Source, SourceLanes, SourcePlan};
 use crate::fault::{FaultLanes, FaultSpec};
 use crate::noise::Key;
 use crate::scalar::Scalar;
@@ -25,14 +25,29 @@ pub fn structure<W: Wiring>(run: &RunSpec, recorded: &[usize]) -> W::Structure {
     W::structure(&Setup { raw: &run.parameters, touched: &touched, driven: &run.driven, recorded })
 }
 
-/// Ports that no waveform drives and a parameter does, each with the parameter's place.
-fn constants<W: Wiring>(run: &RunSpec) -> Vec<(usize, usize)> {
+/// Ports that have a parameter's value where nothing drives them, each with the parameter's place.
+fn fallbacks<W: Wiring>() -> impl Iterator<Item = (usize, usize)> {
     let paths: Vec<String> = W::groups().iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i))).collect();
-    let place = |(port, &driven): (usize, &bool)| {
-        let found = paths.iter().position(|path| path == W::PORTS[port].parameter);
-        found.filter(|_| !driven).map(|index| (port, index))
-    };
-    run.driven.iter().enumerate().filter_map(place).collect()
+    W::PORTS.iter().enumerate().filter_map(move |(port, p)| Some((port, paths.iter().position(|path| path == p.parameter)?)))
+}
+
+/// The port that has a parameter's value where nothing drives it.
+pub(super) fn feeds<W: Wiring>(index: usize) -> Option<usize> {
+    fallbacks::<W>().find(|&(_, place)| place == index).map(|(port, _)| port)
+}
+
+/// A port that sets a parameter.
+#[derive(Clone)]
+struct Held {
+    port: usize,
+    index: usize,
+    /// Lanes in which waveforms drive it.
+    driven: Vec<bool>,
+}
+
+fn held<W: Wiring>(runs: &[&RunSpec]) -> Vec<Held> {
+    let all = |(port, index)| Held { port, index, driven: runs.iter().map(|r| r.driven[port]).collect() };
+    fallbacks::<W>().filter(|(port, _)| W::Machine::HELD_PORTS.contains(port)).map(all).collect()
 }
 
 /// A block of lanes in progress.
@@ -61,7 +76,10 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     inputs: Vec<Inputs<S>>,
     /// Where numbers carry slopes: ports whose value is a parameter's, and which.
     constants: Vec<(usize, usize)>,
-    pub(super) sources: Vec<SourceLanes>,
+    sources: Vec<SourceLanes>,
+    held: Vec<Held>,
+    /// Steps over which those hold their values.
+    hold: Steps,
     pub(super) faults: FaultLanes,
     ticks: Vec<Tick>,
     /// Steps at which each tick and each clock is due next.
@@ -102,12 +120,14 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             stale: false,
             faults,
             sources: (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect(),
+            held: held::<W>(runs),
+            hold: ((HELD / dt).round() as Steps).max(1),
             ticks,
             rows,
             models: Vec::new(),
             states: Vec::new(),
             inputs: vec![Vec::new(); chunks],
-            constants: if L::SLOPES { constants::<W>(first) } else { Vec::new() },
+            constants: if L::SLOPES { fallbacks::<W>().filter(|&(port, _)| !first.driven[port]).collect() } else { Vec::new() },
             status: vec![Status::Ok; runs.len()],
             stopped: vec![None; runs.len()],
             last: vec![Vec::new(); runs.len()],
@@ -121,6 +141,9 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     fn begin(&mut self, runs: &[&RunSpec]) {
         self.faults.renew(0, self.dt);
+        for held in &self.held {
+            self.sources[held.port].renew(0, self.dt);
+        }
         for chunk in 0..self.healthy.len() {
             let raw = self.parameters_now(chunk);
             let model = W::derive(&raw, &self.structure);
@@ -134,6 +157,14 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
 
     fn parameters_now(&self, chunk: usize) -> Vec<S> {
         let mut raw = self.healthy[chunk].clone();
+        let first = chunk * S::LANES;
+        for held in &self.held {
+            let driven = &held.driven[first..first + S::LANES];
+            if driven.contains(&true) {
+                let (own, set) = (raw[held.index], self.sources[held.port].pack::<S>(first).at(S::splat(self.k as f64 * self.dt)));
+                raw[held.index] = S::from_fn(|i| if driven[i] { set.lane(i) } else { own.lane(i) });
+            }
+        }
         self.faults.apply(chunk * S::LANES, &mut raw, &|lane, fault| self.lift.severity(&self.faults, lane, fault));
         raw
     }
@@ -206,6 +237,20 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         self.stale = true;
     }
 
+    /// A port of a lane gets another value of its parameter.
+    pub(super) fn feed(&mut self, lane: usize, port: usize, plan: SourcePlan) {
+        self.sources[port].replace(lane, plan);
+    }
+
+    /// A port of a lane gets another sum of waveforms, which acts from the present step on.
+    pub(super) fn drive(&mut self, lane: usize, port: usize, plan: SourcePlan) {
+        self.feed(lane, port, plan);
+        for held in self.held.iter_mut().filter(|held| held.port == port) {
+            held.driven[lane] = true;
+            self.stale = true;
+        }
+    }
+
     /// A lane gets another fault, which acts from the present step on.
     pub(super) fn replace_fault(&mut self, lane: usize, fault: usize, spec: FaultSpec) {
         self.faults.replace(lane, fault, spec);
@@ -237,9 +282,14 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 renewed |= source.renew(k, self.dt);
             }
         }
+        self.stale |= k > 0 && self.held.iter().any(|held| self.sets(held, k));
         if renewed {
             for chunk in 0..self.inputs.len() {
                 self.inputs[chunk] = self.sources.iter().map(|s| s.pack(chunk * S::LANES)).collect();
+                for held in &self.held {
+                    // No step looks at it.
+                    self.inputs[chunk][held.port] = Source::constant(S::zero());
+                }
                 for &(port, index) in &self.constants {
                     self.inputs[chunk][port] = Source::constant(self.healthy[chunk][index]);
                 }
@@ -254,6 +304,12 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 W::refresh(&self.models[chunk], &self.structure, &raw, &mut self.states[chunk]);
             }
         }
+    }
+
+    /// Does a port set its parameter anew at step `k`?
+    fn sets(&self, held: &Held, k: Steps) -> bool {
+        let source = &self.sources[held.port];
+        source.renewed() == k || k.is_multiple_of(self.hold) && !source.still()
     }
 
     fn tick(&mut self, k: Steps) {
@@ -329,6 +385,9 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         let mut next = self.steps.min((k / STRETCH + 1) * STRETCH).min(self.faults.next());
         for source in &self.sources {
             next = next.min(source.next());
+        }
+        if self.held.iter().any(|held| !self.sources[held.port].still()) {
+            next = next.min((k / self.hold + 1) * self.hold);
         }
         let due = self.tick_due.iter().chain(&self.clock_due).copied().min();
         next = next.min(due.unwrap_or(Steps::MAX));

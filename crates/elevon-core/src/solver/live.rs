@@ -2,7 +2,7 @@
 //! between steps, copies them whole. They have no clock of their own.
 
 use super::batch::{blocks, padded, shape, Monitor, Shape};
-use super::block::Block;
+use super::block::{feeds, Block};
 use super::kernels::Plain;
 use super::spec::{RunSpec, Status};
 use super::width::{with_lanes, Width};
@@ -23,9 +23,14 @@ pub enum Change {
     Fault { place: usize, spec: FaultSpec },
 }
 
-/// The equations in use leave out what the change needs: it must be announced before the start (`RunSpec::tunable`).
+/// Why a change is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Refusal;
+pub enum Refusal {
+    /// The equations in use leave out what it needs: it must be announced before the start (`RunSpec::tunable`).
+    LeftOut,
+    /// The parameter is the value of this port where nothing drives it; something does.
+    Driven(usize),
+}
 
 /// A block of runs in progress.
 pub trait Live: Send + Sync {
@@ -133,13 +138,25 @@ impl<W: Wiring, S: Scalar> Live for Session<W, S> {
     fn change(&mut self, run: usize, change: Change) -> Result<(), Refusal> {
         let next = changed(&self.runs[run], &change);
         if !self.fits(&next, &self.recorded) {
-            return Err(Refusal);
+            return Err(Refusal::LeftOut);
+        }
+        let fed = if let Change::Parameter { index, .. } = change { feeds::<W>(index) } else { None };
+        if let Some(port) = fed.filter(|&port| next.driven[port]) {
+            return Err(Refusal::Driven(port));
         }
         self.runs[run] = next;
+        if let (Some(port), Change::Parameter { value, .. }) = (fed, &change) {
+            self.runs[run].ports[port] = SourcePlan::constant(*value);
+        }
         for lane in self.lanes(run) {
             match change.clone() {
-                Change::Input { port, plan } => self.block.sources[port].replace(lane, plan),
-                Change::Parameter { index, value } => self.block.set(lane, index, value),
+                Change::Input { port, plan } => self.block.drive(lane, port, plan),
+                Change::Parameter { index, value } => {
+                    self.block.set(lane, index, value);
+                    if let Some(port) = fed {
+                        self.block.feed(lane, port, SourcePlan::constant(value));
+                    }
+                }
                 Change::Fault { place, spec } => self.block.replace_fault(lane, place, spec),
             }
         }

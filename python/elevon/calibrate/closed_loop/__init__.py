@@ -1,7 +1,7 @@
 """Calibration by runs of a servo's own closed loop on recorded demands: few channels suffice."""
 
-from elevon.calibrate.closed_loop.log import LoopLog, loop_log
+from elevon.calibrate.closed_loop.log import loop_log
 from elevon.calibrate.closed_loop.predict import predict
-from elevon.calibrate.closed_loop.result import Agreement, LoopCalibration, calibrate_loop
+from elevon.calibrate.closed_loop.result import calibrate_loop
 
-__all__ = ["Agreement", "LoopCalibration", "LoopLog", "calibrate_loop", "loop_log", "predict"]
+__all__ = ["calibrate_loop", "loop_log", "predict"]

@@ -10,17 +10,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.free import Free, asked_for, free_list, inner, outer
-from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.free import asked_for, free_list
 from elevon.calibrate.closed_loop.model import LoopModel
-from elevon.calibrate.closed_loop.objective import Objective
-from elevon.calibrate.closed_loop.solve import solve
 from elevon.calibrate.closed_loop.start import cloud, first_values, windows
+from elevon.estimate import Free
+from elevon.estimate.free import inner, outer
+from elevon.estimate.held_out import folds
+from elevon.estimate.lanes import Lanes
+from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["DECIDED", "Fitted", "Searched", "as_given", "choose", "final_fit", "search"]
+__all__ = [
+    "DECIDED",
+    "Fitted",
+    "Searched",
+    "as_given",
+    "choose",
+    "final_fit",
+    "parts_apart",
+    "refitted",
+    "search",
+]
 
 Check = Callable[[], bool]
 _STARTS = 32
@@ -58,18 +70,19 @@ class Searched:
 class Fitted:
     """The final fit on whole logs."""
 
-    objective: Objective
+    model: LoopModel
+    lanes: Lanes
     x: Floats
 
     @property
     def values(self) -> dict[str, float]:
         """Values by path."""
-        return outer(self.objective.free, self.x)
+        return outer(self.lanes.free, self.x)
 
 
 def search(
     actuator: Actuator,
-    logs: Sequence[LoopLog],
+    logs: Sequence[Log],
     structure: str,
     *,
     seed: int = 0,
@@ -85,14 +98,14 @@ def search(
     parts = windows(logs, whole.per_output)
     free = free_list(actuator, logs, structure, first_values(whole))
     model = LoopModel(actuator, parts, structure, check)
-    objective = Objective(model, free)
-    points = solve(
-        objective, cloud(free, model, _STARTS, seed), rounds=14, keep=_KEEP,
+    lanes = model.lanes(free)
+    points = lanes.solve(
+        cloud(free, model, _STARTS, seed), rounds=14, keep=_KEEP,
         advance=lambda f: advance(0.6 * f),
     )  # fmt: skip
     for _ in range(2):
-        objective.refresh(points[0].x)
-        points = solve(objective, np.array([point.x for point in points[:2]]), rounds=6)
+        lanes.refresh(points[0].x)
+        points = lanes.solve(np.array([point.x for point in points[:2]]), rounds=6)
     best = points[0].x
     advance(0.7)
     score, runs = (math.nan, 0) if alone else _held_out(model, free, best)
@@ -100,61 +113,64 @@ def search(
     return Searched(structure, tuple(free), best, score, model.runs + runs)
 
 
-def as_given(actuator: Actuator, logs: Sequence[LoopLog], names: Sequence[str]) -> Searched:
+def as_given(actuator: Actuator, logs: Sequence[Log], names: Sequence[str]) -> Searched:
     """Begin at the actuator file's values and structure: what some numbers are fitted from."""
     structure = str(actuator.parameters["control.structure"].value)
     free = asked_for(free_list(actuator, logs, structure, {}), names)
     return Searched(structure, tuple(free), inner(free), math.nan, 0)
 
 
-def _folds(parts: Sequence[LoopLog]) -> list[tuple[list[LoopLog], list[LoopLog]]]:
-    """Pairs of windows kept and left out: one log left out, or of a single one every other."""
+def parts_apart(logs: Sequence[Log]) -> list[tuple[list[Log], list[Log]]]:
+    """Pairs of logs kept and left out: of a single one each half."""
+    if len(logs) > 1:
+        return folds(logs)
+    early = logs[0].time < 0.5 * logs[0].duration
+    halves = [logs[0].counting(early), logs[0].counting(~early)]
+    return folds(halves)
+
+
+def _windows_apart(parts: Sequence[Log]) -> list[tuple[list[Log], list[Log]]]:
+    """Pairs of windows kept and left out: those of one log, or of a single one every other."""
     names = list(dict.fromkeys(part.name for part in parts))
-    if len(names) > 1:
-        return [
-            ([p for p in parts if p.name != name], [p for p in parts if p.name == name])
-            for name in names
-        ]
-    if len(parts) > 1:
-        return [(list(parts[::2]), list(parts[1::2])), (list(parts[1::2]), list(parts[::2]))]
-    log = parts[0]
-    early = log.time < 0.5 * log.duration
-    return [([log.restricted(early)], [log.restricted(~early)])]
+    groups = [[part for part in parts if part.name == name] for name in names]
+    if len(groups) == 1 and len(parts) > 1:
+        groups = [list(parts[1::2]), list(parts[::2])]
+    if len(groups) == 1:
+        return parts_apart(parts)[1:]
+    return [([p for group in others for p in group], left[0]) for others, left in folds(groups)]
+
+
+def refitted(model: LoopModel, free: Sequence[Free], x: Floats, rounds: int) -> Floats:
+    """Fit other logs from a point; return where they end."""
+    lanes = model.lanes(free)
+    lanes.refresh(x)
+    return lanes.solve(x[None, :], rounds=rounds)[0].x
 
 
 def _held_out(searched: LoopModel, free: Sequence[Free], x: Floats) -> tuple[float, int]:
     """Log-likelihood of each window under values fitted to the others, and the runs it took."""
     total, runs = 0.0, 0
-    for inside, outside in _folds(searched.logs):
-        model, other = (
-            LoopModel(searched.actuator, logs, searched.structure, searched.check)
-            for logs in (inside, outside)
-        )
-        objective = Objective(model, free)
-        objective.refresh(x)
-        point = solve(objective, x[None, :], rounds=5)[0]
-        total += _likelihood(Objective(other, free), point.x)
+    for inside, outside in _windows_apart(searched.logs):
+        model, other = searched.on(inside), searched.on(outside)
+        total += _likelihood(other.lanes(free), refitted(model, free, x, 5))
         runs += model.runs + other.runs
     return total, runs
 
 
-def _likelihood(objective: Objective, x: Floats) -> float:
+def _likelihood(lanes: Lanes, x: Floats) -> float:
     """Gaussian log-likelihood of held-out residuals at their own spread, nats.
 
     The spread is robust (one jump missed by a sample does not decide), and a log counts one
     independent sample a memory of fixed length, so that structures are compared alike.
     """
     total = 0.0
-    predicted = objective.runs(x)[0]
-    for k, name in objective.keys:
-        log = objective.model.logs[k]
-        run, mask = predicted[k], objective.masks[k, name]
-        if run is None:
+    for item, values in zip(lanes.channels, lanes.predicted(x), strict=True):
+        if values is None:
             return -np.inf
-        residual = ((run[name] - log.signals[name])[mask]) / log.sigma(name)
+        residual = (values - item.data) / item.size
         typical = float(np.median(np.abs(residual))) + 1e-9
         spread = float(np.sqrt(np.mean(np.minimum(residual**2, (5.0 * typical) ** 2))))
-        total -= mask.sum() * log.period / _MEMORY * np.log(spread + 1e-4)
+        total -= len(residual) * item.period / _MEMORY * np.log(spread + 1e-4)
     return float(total)
 
 
@@ -175,7 +191,7 @@ def choose(searched: Sequence[Searched]) -> tuple[Searched, str]:
 
 def final_fit(
     actuator: Actuator,
-    logs: Sequence[LoopLog],
+    logs: Sequence[Log],
     chosen: Searched,
     *,
     rounds: int = 10,
@@ -186,12 +202,11 @@ def final_fit(
     """Fit whole logs from the best point of the search, deviations renewed between rounds."""
     model = LoopModel(actuator, logs, chosen.structure, check)
     items = tuple(free) if free is not None else chosen.free
-    start = outer(chosen.free, chosen.x)
-    objective = Objective(model, items)
-    x = np.array([f.inner(min(max(start[f.path], f.low), f.high)) for f in items])
+    lanes = model.lanes(items)
+    x = inner(items, outer(chosen.free, chosen.x))
     for number in range(3):
-        objective.refresh(x)
-        x = solve(objective, x[None, :], rounds=rounds, central=number == 2)[0].x
+        lanes.refresh(x)
+        x = lanes.solve(x[None, :], rounds=rounds, central=number == 2)[0].x
         advance((number + 1) / 3)
-    objective.refresh(x)
-    return Fitted(objective, x)
+    lanes.refresh(x)
+    return Fitted(model, lanes, x)

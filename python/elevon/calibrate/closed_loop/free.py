@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.log import NAMES, recorded_roles, sigma, unsigned
+from elevon.calibrate.stages.log import motor_ratio
 from elevon.errors import unknown
+from elevon.estimate import Free
+from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -20,12 +20,9 @@ __all__ = [
     "CURRENT_GAIN",
     "LOAD_SHARE",
     "STRUCTURES",
-    "Free",
     "asked_for",
     "free_list",
     "in_set",
-    "inner",
-    "outer",
 ]
 
 
@@ -37,59 +34,7 @@ STICK = "friction.stick"
 LOAD_SHARE = "friction.load_motor"
 #: Of the current loop: its lag stands for all that the drive waits.
 CURRENT_GAIN = "pwm.proportional_gain"
-
-
-@dataclass(frozen=True)
-class Free:
-    """One number that the fit may move.
-
-    Attributes
-    ----------
-    path : str
-        Parameter path, ``friction.stick``, ``sensor.CHANNEL_delay``, ``_lag`` or ``_offset``.
-    unit, register : str
-        SI unit and register, for the report.
-    log_scale : bool
-        Fitted as a logarithm.
-    start : float
-        First value, SI.
-    spread : float
-        Deviation of what is believed before the logs: of the logarithm, or in SI.
-    low, high : float
-        Bounds, SI.
-    """
-
-    path: str
-    unit: str
-    register: str
-    log_scale: bool
-    start: float
-    spread: float
-    low: float
-    high: float
-
-    def inner(self, value: float) -> float:
-        """Return the fitted variable, in its spreads."""
-        return (math.log(value) if self.log_scale else value) / self.spread
-
-    def outer(self, x: float) -> float:
-        """Return the value of a fitted variable."""
-        return math.exp(x * self.spread) if self.log_scale else x * self.spread
-
-    def slope(self, x: float) -> float:
-        """Return d value / d fitted variable."""
-        return self.spread * (math.exp(x * self.spread) if self.log_scale else 1.0)
-
-
-def inner(free: Sequence[Free], values: Mapping[str, float] | None = None) -> Floats:
-    """Return the point of some values (of the starts), clipped to the bounds."""
-    given = values or {}
-    return np.array([f.inner(min(max(given.get(f.path, f.start), f.low), f.high)) for f in free])
-
-
-def outer(free: Sequence[Free], x: Floats) -> dict[str, float]:
-    """Return paths and values of a point."""
-    return {f.path: f.outer(float(v)) for f, v in zip(free, x, strict=True)}
+_SECONDS = (False, "s", "sensor")  # of a delay: no logarithm, unit, register
 
 
 def in_set(path: str) -> bool:
@@ -98,13 +43,13 @@ def in_set(path: str) -> bool:
 
 
 def free_list(
-    actuator: Actuator, logs: Sequence[LoopLog], structure: str, starts: Mapping[str, float]
+    actuator: Actuator, logs: Sequence[Log], structure: str, starts: Mapping[str, float]
 ) -> list[Free]:
     """List what the logs may determine of a servo under one structure of its controller.
 
     `starts` are first values from the signals; what is not there starts from the actuator file.
     """
-    channels = {name for log in logs for name in log.signals}
+    channels = {NAMES[role] for log in logs for role in recorded_roles(log)}
     items = [*_plant(actuator), *_controller(actuator, structure)]
     items += [*_current_loop(actuator), *_limits(channels)]
     return [_started(item, actuator, starts) for item in items] + _logger_rows(logs, channels)
@@ -129,7 +74,7 @@ def asked_for(free: Sequence[Free], names: Sequence[str]) -> list[Free]:
 
 
 def _row(path: str, unit: str, register: str, spread: float, bounds: tuple[float, float]) -> Free:
-    return Free(path, unit, register, True, math.nan, spread, *bounds)
+    return Free(path, math.nan, spread, *bounds, True, unit, register)
 
 
 def _plant(actuator: Actuator) -> list[Free]:
@@ -143,10 +88,10 @@ def _plant(actuator: Actuator) -> list[Free]:
     ]
     if str(actuator.parameters["friction.law"].value) == "load_dependent":
         rows.append(_row(LOAD_SHARE, "1", "plant", 1.0, (1e-3, 0.9)))
-    weight = _torque_scale(actuator) * _per_output(actuator)
+    weight = _torque_scale(actuator) * motor_ratio(actuator)
     rows.append(
-        Free("load.constant", "N" if linear else "N m", "load", False, 0.0, weight,
-             -50.0 * weight, 50.0 * weight)
+        Free("load.constant", 0.0, weight, -50.0 * weight, 50.0 * weight,
+             unit="N" if linear else "N m", register="load")
     )  # fmt: skip
     return rows
 
@@ -187,50 +132,36 @@ def _limits(channels: set[str]) -> list[Free]:
     return rows
 
 
-def _logger_rows(logs: Sequence[LoopLog], channels: set[str]) -> list[Free]:
+def _logger_rows(logs: Sequence[Log], channels: set[str]) -> list[Free]:
     period = max(log.period for log in logs)
     late = max(1.5 * period, 2e-3)
     units = {"position": "", "motor_position": "rad", "speed": "", "motor_speed": "rad/s",
              "current": "A", "voltage": "V"}  # fmt: skip
     rows = []
     for name in sorted(channels):
-        rows.append(
-            Free(
-                f"sensor.{name}_delay", "s", "sensor", False, 0.5 * period, late, -late, 20.0 * late
-            )
-        )
+        rows.append(Free(f"sensor.{name}_delay", 0.5 * period, late, -late, 20.0 * late, *_SECONDS))
         if name in {"speed", "motor_speed"}:
             # Not from zero: there a lag is a delay, to first order.
-            rows.append(
-                Free(f"sensor.{name}_lag", "s", "sensor", False, period, late, 0.0, 20.0 * late)
-            )
-        size = max(log.sigma(name) for log in logs if name in log.signals)
-        if size > 0.0 and not any(log.magnitude for log in logs if name == "current"):
+            rows.append(Free(f"sensor.{name}_lag", period, late, 0.0, 20.0 * late, *_SECONDS))
+        role = next(role for role, short in NAMES.items() if short == name)
+        size = max(sigma(log, role) for log in logs if log.has(role))
+        if size > 0.0 and not any(unsigned(log) for log in logs if name == "current"):
             step = 0.1 * size
             rows.append(
-                Free(f"sensor.{name}_offset", units[name], "sensor", False, 0.0, step,
-                     -20.0 * step, 20.0 * step)
+                Free(f"sensor.{name}_offset", 0.0, step, -20.0 * step, 20.0 * step,
+                     unit=units[name], register="sensor")
             )  # fmt: skip
     return rows
 
 
 def _started(item: Free, actuator: Actuator, starts: Mapping[str, float]) -> Free:
     """Give a row its first value and bring it inside its bounds."""
-    from dataclasses import replace
-
     first = starts.get(item.path)
     if first is None:
         first = 1.1 if item.path == STICK else actuator.parameters.value(item.path)
     if item.log_scale and not first > 0.0:
         first = math.sqrt(item.low * item.high)
     return replace(item, start=min(max(float(first), item.low), item.high))
-
-
-def _per_output(actuator: Actuator) -> float:
-    """Motor angle over the output's coordinate."""
-    value = actuator.parameters.value
-    lead = value("screw.lead") if actuator.wiring == "ballscrew" else 1.0
-    return value("gear.ratio") / lead
 
 
 def _torque_scale(actuator: Actuator) -> float:

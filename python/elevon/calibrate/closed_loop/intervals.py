@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.blocks import block_length
 from elevon.calibrate.closed_loop.fit import Fitted
-from elevon.calibrate.closed_loop.free import CURRENT_GAIN, LOAD_SHARE, STICK, Free, outer
+from elevon.calibrate.closed_loop.free import CURRENT_GAIN, LOAD_SHARE, STICK
+from elevon.calibrate.closed_loop.log import motion
 from elevon.calibrate.closed_loop.model import LoopModel
-from elevon.calibrate.closed_loop.objective import Objective
 from elevon.calibrate.closed_loop.refine import FALL
-from elevon.calibrate.closed_loop.solve import Point, jacobian
+from elevon.estimate import Free
+from elevon.estimate.covariance import block_covariance
+from elevon.estimate.lanes import Lanes, Point
 
 __all__ = ["SILENT", "Knowledge", "known"]
 
@@ -80,97 +81,67 @@ class Knowledge:
 
 def known(fitted: Fitted) -> tuple[list[Knowledge], float]:
     """Return what is known of each number, and the degrees of freedom of the intervals."""
-    objective, x = fitted.objective, fitted.x
-    residual = objective.residual(x[None, :])[0]
-    point = Point(x, residual, objective.cost(residual, x))
-    jac = jacobian(objective, [point], central=True)[0]
-    weight = objective.weight(residual)
-    belief = objective.belief**2 * np.eye(len(x))
-    normal = jac.T @ (weight[:, None] * jac) + belief
-    bread = np.linalg.inv(normal)
-    sums = _block_sums(objective, jac, weight * residual)
-    degrees = float(max(len(sums) - len(x), 1))
-    colour = sums.T @ sums * (len(sums) / degrees)
-    covariance = bread @ (colour + belief) @ bread + _misfit(objective, point, jac, weight)
-    covariance = covariance + _choices(objective, point, bread @ (jac.T * weight))
-    covariance = covariance + _directions(objective, x) + _lagged(objective, x)
-    strength = np.sqrt(np.einsum("np,n,np->p", jac, weight, jac))
+    lanes = fitted.lanes
+    point = lanes.point(fitted.x)
+    jac = lanes.jacobian([point], central=True)[0]
+    weight = lanes.weight(point.residual)
+    normal, scores = jac.T @ (weight[:, None] * jac), weight * point.residual
+    belief = lanes.belief**2 * np.eye(len(fitted.x))
+    covariance, degrees = block_covariance(
+        normal, jac * scores[:, None], lanes.blocks(scores), prior=belief
+    )
+    gain = np.asarray(np.linalg.solve(lanes.normal(jac, weight), jac.T * weight), np.float64)
+    covariance = covariance + _misfit(lanes, point, jac, weight)
+    covariance = covariance + _choices(fitted, point, gain)
+    covariance = covariance + _directions(fitted) + _lagged(lanes.free, fitted.x)
+    reasons = _reasons(lanes, fitted.x, covariance, np.sqrt(np.diag(normal)))
     return [
-        Knowledge(f, float(x[k]), float(np.sqrt(covariance[k, k])), reason)
-        for k, (f, reason) in enumerate(
-            zip(objective.free, _reasons(objective, x, covariance, strength), strict=True)
+        Knowledge(f, float(x), float(std), reason)
+        for f, x, std, reason in zip(
+            lanes.free, fitted.x, np.sqrt(np.diag(covariance)), reasons, strict=True
         )
     ], degrees
 
 
-def _slices(objective: Objective) -> dict[tuple[int, str], slice]:
-    begin, slices = 0, {}
-    for key in objective.keys:
-        count = int(objective.masks[key].sum())
-        slices[key] = slice(begin, begin + count)
-        begin += count
-    return slices
-
-
-def _block_sums(objective: Objective, jac: Floats, weighted: Floats) -> Floats:
-    """Scores of all channels summed over blocks of time longer than any residual's memory."""
-    places = _slices(objective)
-    sums = []
-    for k, log in enumerate(objective.model.logs):
-        keys = [key for key in objective.keys if key[0] == k]
-        memory = max(block_length(weighted[places[key]], log.period) for key in keys)
-        total = np.zeros((int(log.duration / memory) + 1, jac.shape[1]))
-        for key in keys:
-            block = np.floor(log.time[objective.masks[key]] / memory).astype(np.int64)
-            score = jac[places[key]] * weighted[places[key], None]
-            np.add.at(total, block, score)
-        sums.append(total[np.any(total != 0.0, axis=1)])
-    return np.vstack(sums)
-
-
-def _misfit(objective: Objective, point: Point, jac: Floats, weight: Floats) -> Floats:
+def _misfit(lanes: Lanes, point: Point, jac: Floats, weight: Floats) -> Floats:
     """Spread of the values over other weights of channels and logs, by one step of Newton each.
 
     A model that is not the machine fits each channel with values of its own; where they agree,
     weights do not matter.
     """
-    places = _slices(objective)
-    groups = [[key for key in places if key[1] == name] for name in objective.model.channels]
-    groups += [[key for key in places if key[0] == k] for k in range(len(objective.model.logs))]
-    groups = [group for group in groups if group and len(group) < len(places)]
-    size = jac.shape[1]
-    total = np.zeros((size, size))
-    count = 0
-    for group in groups:
+    every = list(zip(lanes.channels, lanes.slices, strict=True))
+    names = dict.fromkeys(item.name for item in lanes.channels)
+    groups = [[place for item, place in every if item.name == name] for name in names]
+    logs = dict.fromkeys(item.log for item in lanes.channels)
+    groups += [[place for item, place in every if item.log == log] for log in logs]
+    rows: list[Floats] = [np.zeros(jac.shape[1])]
+    for group in (group for group in groups if len(group) < len(every)):
         for factor in _WEIGHTS:
-            w = weight.copy()
-            for key in group:
-                w[places[key]] *= factor
-            normal = jac.T @ (w[:, None] * jac) + objective.belief**2 * np.eye(size)
-            slope = jac.T @ (w * point.residual) + objective.belief * objective.prior(point.x)
-            moved = -np.linalg.solve(normal, slope)
-            total += np.outer(moved, moved)
-            count += 1
-    return total / max(count, 1)
+            other = weight.copy()
+            for place in group:
+                other[place] *= factor
+            slope = lanes.slope(point, jac, other)
+            rows.append(np.asarray(np.linalg.solve(lanes.normal(jac, other), slope), np.float64))
+    moved = np.array(rows)
+    return np.asarray(moved.T @ moved / max(len(rows) - 1, 1), np.float64)
 
 
-def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
+def _choices(fitted: Fitted, point: Point, gain: Floats) -> Floats:
     """What choices of the model that no slow log settles would change, by one step of Newton each.
 
     Each alternative is run once at the same values; the late drive as a longer step of the model,
     its effect scaled to `_LATE` where the lag of the current loop was not fitted. Where it was, the
     lag is shorter by what the longer step waits: a delay takes nothing from an amplitude.
     """
-    model = objective.model
+    model, free = fitted.model, fitted.lanes.free
     later = _later(model)
-    lags = any(item.path == CURRENT_GAIN for item in objective.free)
-    total = np.zeros((gain.shape[0], gain.shape[0]))
-    for changes in _alternatives(objective, point.x):
+    lags = any(item.path == CURRENT_GAIN for item in free)
+    total = np.zeros((len(free), len(free)))
+    for changes in _alternatives(fitted):
         other = model.actuator.with_values(changes, source="calibration")
-        changed = LoopModel(other, model.logs, model.structure, model.check)
-        run = Objective(changed, objective.free)
-        run.scales = objective.scales
-        x = _hastened(objective, point.x, 0.5 * later) if "low.step" in changes else point.x
+        run = LoopModel(other, model.logs, model.structure, model.check).lanes(free)
+        run.scales = fitted.lanes.scales
+        x = _hastened(fitted, 0.5 * later) if "low.step" in changes else point.x
         moved = gain @ (run.residual(x[None, :])[0] - point.residual)
         if "low.step" in changes and not lags:
             moved = moved * (_LATE / later)
@@ -178,9 +149,8 @@ def _choices(objective: Objective, point: Point, gain: Floats) -> Floats:
     return total
 
 
-def _lagged(objective: Objective, x: Floats) -> Floats:
+def _lagged(free: Sequence[Free], x: Floats) -> Floats:
     """What the lag of the current loop in place of a drive's delay takes from others."""
-    free = objective.free
     if all(item.path != CURRENT_GAIN for item in free):
         return np.zeros((len(x), len(x)))
     moved = [
@@ -190,80 +160,79 @@ def _lagged(objective: Objective, x: Floats) -> Floats:
     return np.diag(np.square(moved))
 
 
-def _hastened(objective: Objective, x: Floats, by: float) -> Floats:
+def _hastened(fitted: Fitted, by: float) -> Floats:
     """Return the point with a shorter lag of the current loop, where that is fitted."""
-    x = np.array(x)
-    inductance = objective.model.actuator.parameters.value("motor.winding_inductance")
-    for k, item in enumerate(objective.free):
+    x = np.array(fitted.x)
+    inductance = fitted.model.actuator.parameters.value("motor.winding_inductance")
+    for k, item in enumerate(fitted.lanes.free):
         if item.path == CURRENT_GAIN:
             lag = max(inductance / item.outer(float(x[k])) - by, inductance / item.high)
             x[k] = item.inner(inductance / lag)
     return x
 
 
-def _directions(objective: Objective, x: Floats) -> Floats:
+def _directions(fitted: Fitted) -> Floats:
     """What a constant load may take from the friction of both directions.
 
     Friction f and load L show as f + L in one direction and r f - L in the other, whatever moves:
     two sums of three numbers. The third comes from what is believed of the ratio r, and from laws
     of friction.
     """
-    values = outer(objective.free, x)
-    total = np.zeros((len(x), len(x)))
-    if not {"friction.dynamic", _RATIO, "load.constant"} <= values.keys():
-        return total
-    dry, ratio = values["friction.dynamic"], values[_RATIO]
-    place = {item.path: k for k, item in enumerate(objective.free)}
-    change = -objective.free[place[_RATIO]].spread * ratio / (1.0 + ratio)
-    moved = np.zeros(len(x))
-    for path, amount in (
-        ("friction.dynamic", change * dry),
-        ("load.constant", -change * dry * objective.model.per_output),
-        (_RATIO, -change * (1.0 + ratio)),
-    ):
-        k = place[path]
-        moved[k] = amount / objective.free[k].slope(float(x[k]))
-    return np.asarray(total + np.outer(moved, moved))
+    free, values = fitted.lanes.free, fitted.values
+    moved = np.zeros(len(free))
+    if {"friction.dynamic", _RATIO, "load.constant"} <= values.keys():
+        dry, ratio = values["friction.dynamic"], values[_RATIO]
+        place = {item.path: k for k, item in enumerate(free)}
+        change = -free[place[_RATIO]].spread * ratio / (1.0 + ratio)
+        for path, amount in (
+            ("friction.dynamic", change * dry),
+            ("load.constant", -change * dry * fitted.model.per_output),
+            (_RATIO, -change * (1.0 + ratio)),
+        ):
+            k = place[path]
+            moved[k] = amount / free[k].slope(float(fitted.x[k]))
+    return np.outer(moved, moved)
 
 
 def _later(model: LoopModel) -> float:
     return max(0.5 * model.actuator.parameters.value("low.step"), _LEAST_LATER)
 
 
-def _alternatives(objective: Objective, x: Floats) -> list[dict[str, str | float]]:
+def _alternatives(fitted: Fitted) -> list[dict[str, str | float]]:
     """List other models that would follow the logs as well.
 
     A drive acts some time after it has read; friction may fall with speed or grow with the torque.
     Where it does, it may fall over half or twice the speed, and what the torque adds to it may
     stick as much above its moving value as the rest.
     """
-    model = objective.model
+    model, values = fitted.model, fitted.values
     parameters = model.actuator.parameters
     steps: list[dict[str, str | float]] = [
         {"low.step": parameters.value("low.step") + _later(model)}
     ]
     if str(parameters["friction.law"].value) != "load_dependent":
-        speed = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
+        tops = [np.nanmax(np.abs(motion(log, model.per_output)[0])) for log in model.logs]
+        speed = float(max(tops))
         steps += [
             {"friction.law": law, "friction.stribeck_speed": FALL * speed}
             for law in ("stribeck", "load_dependent")
         ]
         return steps
-    fall, values = parameters.value("friction.stribeck_speed"), outer(objective.free, x)
+    fall = parameters.value("friction.stribeck_speed")
     share = values.get(LOAD_SHARE, parameters.value(LOAD_SHARE))
     sticking = min((values.get(STICK, 1.0) - 1.0) * share, 0.98 - share)
     steps += [{"friction.stribeck_speed": factor * fall} for factor in (0.5, 2.0)]
     return [*steps, {"friction.load_motor_stribeck": max(sticking, 0.0)}]
 
 
-def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floats) -> list[str]:
+def _reasons(lanes: Lanes, x: Floats, covariance: Floats, strength: Floats) -> list[str]:
     """Why each number is not determined; empty where it is."""
     spread = np.sqrt(np.diag(covariance))
     together = covariance / np.outer(spread, spread)
     reasons = []
-    for k, f in enumerate(objective.free):
+    for k, f in enumerate(lanes.free):
         wide = spread[k] * f.spread > _SHARE if f.log_scale else spread[k] > _TENTH
-        bound = min(x[k] - objective.low[k], objective.high[k] - x[k]) < 1e-6
+        bound = min(x[k] - lanes.low[k], lanes.high[k] - x[k]) < 1e-6
         if not wide and not bound:
             reasons.append("")
         elif strength[k] < _SILENT and f.path in _LIMITS:
@@ -273,7 +242,7 @@ def _reasons(objective: Objective, x: Floats, covariance: Floats, strength: Floa
         elif bound and f.path != "friction.stick":
             reasons.append(f"ends at its bound, {f.outer(float(x[k])):.4g} {f.unit}")
         else:
-            reasons.append(_confounded(objective.free, together[k], k, wide))
+            reasons.append(_confounded(lanes.free, together[k], k, wide))
     return reasons
 
 

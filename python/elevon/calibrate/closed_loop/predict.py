@@ -1,77 +1,73 @@
-"""A calibrated servo on logs that it has not seen."""
+"""A servo on the demands of logs: errors of what it predicts, with values fitted without them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.log import LoopLog
-from elevon.errors import InputError
+from elevon.calibrate.closed_loop.fit import Fitted, parts_apart, refitted
+from elevon.calibrate.closed_loop.free import STICK, in_set
+from elevon.calibrate.closed_loop.log import NAMES
+from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
+from elevon.errors import InputError, unknown
+from elevon.estimate.free import outer
+from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Agreement", "errors_of", "predict"]
+__all__ = ["held_out_errors", "predict", "traces_of", "units_of", "validate_loop"]
+
+_UNITS = {"position": "m", "speed": "m/s", "motor_position": "rad", "motor_speed": "rad/s",
+          "current": "A", "voltage": "V"}  # fmt: skip
+_ROUNDS = 4
+TRANSIENT = 1.0  # s: what the first state of a drive decides
 
 
-@dataclass(frozen=True)
-class Agreement:
-    """RMS error of one channel of one log: SI, and shares of the signal's range and RMS."""
-
-    log: str
-    channel: str
-    rms: float
-    of_range: float
-    of_rms: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain types, percent as elsewhere."""
-        return {
-            "log": self.log,
-            "signal": self.channel,
-            "rms": self.rms,
-            "rms_percent_of_range": 100.0 * self.of_range,
-            "rms_percent_of_rms": 100.0 * self.of_rms,
-        }
+def units_of(wiring: str) -> dict[str, str]:
+    """Return name to SI unit of what a log may show."""
+    linear = wiring == "ballscrew"
+    return {
+        name: unit if linear else unit.replace("m", "rad", 1)
+        for name, unit in _UNITS.items()
+        if not name.startswith("motor")
+    } | {name: unit for name, unit in _UNITS.items() if name.startswith("motor")}
 
 
-def errors_of(log: LoopLog, logger: Mapping[str, Floats]) -> list[Agreement]:
-    """Return the error of each channel over the samples that count."""
-    rows = []
-    for name, values in logger.items():
-        mask = log.used & np.isfinite(log.signals[name])
-        data = log.signals[name][mask]
-        rms = float(np.sqrt(np.mean((values[mask] - data) ** 2)))
-        size, span = float(np.sqrt(np.mean(data**2))), float(np.ptp(data))
-        rows.append(
-            Agreement(
-                log.name, name, rms, rms / span if span else np.inf, rms / size if size else np.inf
-            )
-        )
-    return rows
+def traces_of(model: LoopModel, values: Mapping[str, float]) -> list[ValidationTrace]:
+    """Run one point on the logs of a model.
+
+    Raises
+    ------
+    InputError
+        A run leaves the finite numbers.
+    """
+    traces = []
+    for log, run in zip(model.logs, model.simulate([values])[0], strict=True):
+        if run is None:
+            raise InputError(f"{log.name}: the model's run leaves the finite numbers")
+        traces.append(ValidationTrace.of(log, run, NAMES))
+    return traces
 
 
 def predict(
-    logs: Sequence[LoopLog], actuator: Actuator, logger: Mapping[str, float] | None = None
-) -> tuple[list[Agreement], list[dict[str, Floats]]]:
+    logs: Sequence[Log], actuator: Actuator, logger: Mapping[str, float] | None = None
+) -> tuple[list[SignalError], list[ValidationTrace]]:
     """Run a servo on the demands of logs and compare.
 
     Parameters
     ----------
-    logs : sequence of LoopLog
+    logs : sequence of Log
         Held-out data.
     actuator : Actuator
         Calibrated; its own `control.structure` holds.
     logger : mapping of str to float, optional
-        Delays and offsets of the logger, `LoopCalibration.logger`.
+        Delays and offsets of the logger, ``facts["logger"]`` of the calibration.
 
     Returns
     -------
-    list of Agreement, list of dict
+    list of SignalError, list of ValidationTrace
         Errors by log and channel, and each log's channels as predicted.
 
     Raises
@@ -79,17 +75,75 @@ def predict(
     InputError
         A run leaves the finite numbers.
     """
-    from elevon.calibrate.closed_loop.free import STICK
-    from elevon.calibrate.closed_loop.model import LoopModel
-
-    structure = str(actuator.parameters["control.structure"].value)
-    model = LoopModel(actuator, logs, structure)
-    model.keep_gains(actuator)
+    model = LoopModel(actuator, logs, str(actuator.parameters["control.structure"].value))
     values = {path: value for path, value in (logger or {}).items() if path != STICK}
-    errors, traces = [], []
-    for log, run in zip(logs, model.simulate([values])[0], strict=True):
-        if run is None:
-            raise InputError(f"{log.name}: the model's run leaves the finite numbers")
-        errors += errors_of(log, run)
-        traces.append(run)
-    return errors, traces
+    traces = traces_of(model, values)
+    units = units_of(actuator.wiring)
+    return [row for trace in traces for row in trace.errors(units)], traces
+
+
+def held_out_errors(fitted: Fitted, transient: float = TRANSIENT) -> Validation:
+    """Refit without each log in turn (each half of a single one) and predict what was left out.
+
+    The second half of a single log is predicted by its first, and the other way round.
+    """
+    model, free = fitted.model, fitted.lanes.free
+    late = [log.counting(log.time >= transient) for log in model.logs]
+    traces = []
+    for others, left in parts_apart(late):
+        x = refitted(model.on(others), free, fitted.x, _ROUNDS)
+        traces += traces_of(model.on(left), outer(free, x))
+    units = units_of(model.actuator.wiring)
+    logger = {
+        path.removeprefix("sensor."): value
+        for path, value in fitted.values.items()
+        if not in_set(path)
+    }
+    return Validation(
+        model.actuator.name, "low", transient,
+        tuple(row for trace in traces for row in trace.errors(units)),
+        {log.name: "as logged" for log in model.logs}, tuple(traces), logger,
+    )  # fmt: skip
+
+
+def validate_loop(
+    logs: Sequence[Log],
+    actuator: Actuator,
+    transient: float | None = None,
+    logger: Mapping[str, float] | None = None,
+) -> Validation:
+    """Hold a servo against logs in its own closed loop on the recorded demand.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Not those of the calibration.
+    actuator : Actuator
+        Its ``[validation]`` table has the thresholds, and the logger's delays and offsets.
+    transient : float, optional
+        Seconds left out; default: the actuator file's, else one.
+    logger : mapping of str to float, optional
+        The logger's delays, lags and offsets (`Validation.offsets`); default: the actuator file's.
+
+    Raises
+    ------
+    InputError
+        A transient longer than a log, a threshold of a channel that is none.
+    """
+    promised, units = actuator.validation or {}, units_of(actuator.wiring)
+    limits = dict(promised.get("limits", {}))
+    offsets = dict(promised.get("offsets", {}) if logger is None else logger)
+    for name in limits:
+        if name not in units:
+            raise unknown("signal", name, units, f"{actuator.name}: validation.limits")
+    given = float(promised.get("transient", TRANSIENT)) if transient is None else transient
+    for log in logs:
+        if not given < log.duration:
+            raise InputError(f"transient of {given:g} s: {log.name} lasts {log.duration:g} s")
+    late = [log.counting(log.time >= given) for log in logs]
+    _, traces = predict(late, actuator, {f"sensor.{name}": v for name, v in offsets.items()})
+    return Validation(
+        actuator.name, "low", given,
+        tuple(row for trace in traces for row in trace.errors(units, limits)),
+        {log.name: "as logged" for log in logs}, tuple(traces), offsets,
+    )  # fmt: skip

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.calibrate.closed_loop.fit import Searched
-from elevon.calibrate.closed_loop.free import LOAD_SHARE, free_list, inner, outer
-from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.free import LOAD_SHARE, free_list
+from elevon.calibrate.closed_loop.log import motion
 from elevon.calibrate.closed_loop.model import LoopModel
-from elevon.calibrate.closed_loop.objective import Objective
-from elevon.calibrate.closed_loop.solve import Point, solve
 from elevon.calibrate.closed_loop.start import windows
+from elevon.estimate.free import inner, outer
+from elevon.estimate.lanes import Point
+from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -36,7 +37,7 @@ _ROUNDS = 6
 
 def refined(
     actuator: Actuator,
-    logs: Sequence[LoopLog],
+    logs: Sequence[Log],
     chosen: Searched,
     *,
     check: Callable[[], bool] = lambda: True,
@@ -54,13 +55,13 @@ def refined(
     scales = None
     for step in steps(servo, logs):
         late = servo.with_values({"low.step": step}, source="calibration")
-        objective = Objective(LoopModel(late, parts, chosen.structure, check), free)
+        lanes = LoopModel(late, parts, chosen.structure, check).lanes(free)
         x = inner(free, outer(chosen.free, chosen.x))
         if scales is None:
-            objective.refresh(x)
-            scales = objective.scales
-        objective.scales = dict(scales)
-        tried.append((late, solve(objective, x[None, :], rounds=_ROUNDS)[0]))
+            lanes.refresh(x)
+            scales = lanes.scales
+        lanes.scales = scales.copy()
+        tried.append((late, lanes.solve(x[None, :], rounds=_ROUNDS)[0]))
     best, point = min(tried, key=_cost)
     # The belief stays with the first values of the search.
     first = {item.path: item.start for item in chosen.free}
@@ -72,7 +73,7 @@ def _cost(tried: tuple[Actuator, Point]) -> float:
     return tried[1].cost
 
 
-def steps(actuator: Actuator, logs: Sequence[LoopLog]) -> list[float]:
+def steps(actuator: Actuator, logs: Sequence[Log]) -> list[float]:
     """Return the steps of the model that are tried, the actuator file's own first, s."""
     coarse = actuator.parameters.value("low.step")
     longest = _PERIODS * min(log.period for log in logs)
@@ -82,12 +83,12 @@ def steps(actuator: Actuator, logs: Sequence[LoopLog]) -> list[float]:
     return [coarse, *(tick for tick in _TICKS if coarse < tick <= longest)]
 
 
-def load_share(actuator: Actuator, logs: Sequence[LoopLog], structure: str) -> Actuator:
+def load_share(actuator: Actuator, logs: Sequence[Log], structure: str) -> Actuator:
     """Return the servo with friction that grows with the torque; a law of bristles stays."""
     if str(actuator.parameters["friction.law"].value) not in {"borello", "stribeck"}:
         return actuator
     model = LoopModel(actuator, logs, structure)
-    top = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in logs)
+    top = max(float(np.nanmax(np.abs(motion(log, model.per_output)[0]))) for log in logs)
     if not top > 0.0:
         return actuator
     values: dict[str, str | float] = {

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,23 +18,23 @@ from elevon.calibrate.closed_loop.fit import (
     search,
 )
 from elevon.calibrate.closed_loop.free import CURRENT_GAIN, STICK, STRUCTURES, in_set
-from elevon.calibrate.closed_loop.held_out import held_out_errors
 from elevon.calibrate.closed_loop.intervals import SILENT, Knowledge, known
-from elevon.calibrate.closed_loop.log import LoopLog
-from elevon.calibrate.closed_loop.predict import Agreement, errors_of
+from elevon.calibrate.closed_loop.predict import held_out_errors, traces_of, units_of
 from elevon.calibrate.closed_loop.refine import refined
-from elevon.calibrate.estimate import Estimate, quantile
-from elevon.calibrate.outcome import Outcome, log_facts
+from elevon.calibrate.named import named
+from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.validation import SignalError
 from elevon.errors import InputError, Interrupted
+from elevon.estimate import Estimate, quantile
+from elevon.logs.log import Log
 from elevon.parameters.relations import static_following
 from elevon.progress import Progress
 from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.validation import Validation
 
-__all__ = ["Agreement", "LoopCalibration", "agreement", "calibrate_loop"]
+__all__ = ["agreement", "calibrate_loop"]
 
 #: What scales with the torque constant that the current is read by.
 _SCALED = {
@@ -44,60 +43,9 @@ _SCALED = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class LoopCalibration(Outcome):
-    """The answer; see `elevon.calibrate.outcome.Outcome` for what every answer has.
-
-    Attributes
-    ----------
-    logs : tuple of LoopLog
-        The data.
-    structure : str
-        Of the controller that explains the logs.
-    why : str
-        In words.
-    searched : tuple of Searched
-        Each structure tried.
-    agreement : tuple of Agreement
-        Errors of the fit.
-    logger : mapping of str to float
-        Delays and offsets of the log, and `friction.stick`: what is no parameter of an actuator
-        file.
-    held_out : Validation
-        Errors of each log under values fitted to the others.
-    """
-
-    logs: tuple[LoopLog, ...]
-    structure: str
-    why: str
-    searched: tuple[Searched, ...]
-    agreement: tuple[Agreement, ...]
-    logger: Mapping[str, float]
-    held_out: Validation
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            **self.head([log_facts(log) for log in self.logs]),
-            "undetermined": dict(self.undetermined),
-            "structure": {
-                "chosen": self.structure,
-                "why": self.why,
-                "held_out": {
-                    item.structure: item.held_out
-                    for item in self.searched
-                    if np.isfinite(item.held_out)
-                },
-            },
-            "agreement": [item.to_dict() for item in self.agreement],
-            "held_out": [item.to_dict() for item in self.held_out.errors],
-            "wall_s": self.wall_s,
-        }
-
-
 @one_blas_thread()
 def calibrate_loop(
-    logs: Sequence[LoopLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
     structure: str | None = None,
@@ -105,12 +53,12 @@ def calibrate_loop(
     transient: float | None = None,
     seed: int = 0,
     progress: Progress | None = None,
-) -> LoopCalibration:
+) -> Calibration:
     """Estimate what recorded demands and whatever was recorded of the motion determine.
 
     Parameters
     ----------
-    logs : sequence of LoopLog
+    logs : sequence of Log
         Demands and channels on one clock each.
     actuator : Actuator
         A servo with the numbers of its datasheets; what they do not say is a first guess.
@@ -152,25 +100,27 @@ def calibrate_loop(
     validated = held_out_errors(fitted)
     estimates, missing = _settled(fitted, logs, actuator, unsettled, free)
     say(1.0)
-    return LoopCalibration(
+    tried = {item.structure: item.held_out for item in searched if np.isfinite(item.held_out)}
+    return Calibration(
         actuator=_with(servo, fitted, chosen.structure, missing),
         before=actuator,
-        logs=tuple(logs),
-        estimates=tuple(estimates),
+        logs=log_facts(logs),
+        parameters=by_path(estimates),
         undetermined=missing,
-        structure=chosen.structure,
-        why=why,
-        searched=tuple(searched),
-        agreement=tuple(agreement(fitted)),
-        logger={p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
-        held_out=validated,
+        facts={
+            "structure": {"chosen": chosen.structure, "why": why, "held_out": tried},
+            "agreement": agreement(fitted),
+            "held_out": validated.errors,
+            "logger": {p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
+        },
+        promise=validated,
         wall_s=clock.perf_counter() - begin,
     )
 
 
 def _settled(
     fitted: Fitted,
-    logs: Sequence[LoopLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     unsettled: Mapping[str, str],
     free: Sequence[str] | None,
@@ -190,12 +140,12 @@ def _settled(
 
 
 def _ratios_only(
-    estimates: Sequence[Estimate], logs: Sequence[LoopLog], fitted: Fitted
+    estimates: Sequence[Estimate], logs: Sequence[Log], fitted: Fitted
 ) -> dict[str, str]:
     """Why torques are not determined where neither current nor voltage was logged."""
-    if any({"current", "voltage"} & log.signals.keys() for log in logs):
+    if any(log.has(role) for log in logs for role in ("torque_current", "torque_voltage")):
         return {}
-    limit = fitted.objective.model.actuator.parameters.value("control.current_limit")
+    limit = fitted.model.actuator.parameters.value("control.current_limit")
     return {
         item.path: f"no current was logged: torques, inertia and gains are known by their ratios; "
         f"{item.value:.4g} {item.unit} if control.current_limit is {limit:g} A, as given"
@@ -204,19 +154,19 @@ def _ratios_only(
     }
 
 
-def _late(logs: Sequence[LoopLog], transient: float | None) -> list[LoopLog]:
+def _late(logs: Sequence[Log], transient: float | None) -> list[Log]:
     """Return the logs without their first seconds."""
     if transient is None:
         return list(logs)
     for log in logs:
         if not 0.0 <= transient < log.duration:
             raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
-    return [log.restricted(log.time >= transient) for log in logs]
+    return [log.counting(log.time >= transient) for log in logs]
 
 
 def _searched(
     actuator: Actuator,
-    logs: Sequence[LoopLog],
+    logs: Sequence[Log],
     structure: str | None,
     seed: int,
     say: _Reporter,
@@ -262,7 +212,7 @@ class _Reporter:
         return self.progress is None or self.progress(self.fraction) is not False
 
 
-def _check(logs: Sequence[LoopLog], actuator: Actuator, structure: str | None) -> None:
+def _check(logs: Sequence[Log], actuator: Actuator, structure: str | None) -> None:
     from elevon.errors import unknown
     from elevon.parameters.records import records
 
@@ -289,13 +239,12 @@ def _estimates(
         if path == STICK:
             seen = _static(row, by_path["friction.dynamic"])
             path = "friction.static"
-        old = actuator.parameters.value(path) if in_set(path) else None
+        number = Estimate(seen.value, seen.deviation, interval=seen.interval(width))
+        given = ("control.torque_constant",) if path in _SCALED else ()
         estimates.append(
-            Estimate(
-                path=path, value=seen.value, std=seen.deviation, interval=seen.interval(width),
-                unit=seen.free.unit, register=row.free.register, old=old, method="simulation",
-                given=("control.torque_constant",) if path in _SCALED else (),
-                in_set=in_set(path),
+            named(
+                number, path, actuator, given=given, source="simulation", unit=seen.free.unit,
+                register=row.free.register,
             )
         )  # fmt: skip
     return estimates, missing
@@ -338,13 +287,8 @@ def _loops(structure: str) -> tuple[str, ...]:
     return ("control.speed_limit",) if structure == "cascade" else ()
 
 
-def agreement(fitted: Fitted) -> list[Agreement]:
-    """Return the RMS errors of a fit by log and channel."""
-    model = fitted.objective.model
-    logger = fitted.objective.runs(fitted.x)[0]
-    return [
-        row
-        for log, run in zip(model.logs, logger, strict=True)
-        if run is not None
-        for row in errors_of(log, run)
-    ]
+def agreement(fitted: Fitted) -> list[SignalError]:
+    """Return the errors of a fit by log and channel."""
+    units = units_of(fitted.model.actuator.wiring)
+    traces = traces_of(fitted.model, fitted.values)
+    return [row for trace in traces for row in trace.errors(units)]

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.free import Free, inner
-from elevon.calibrate.closed_loop.log import LoopLog
+from elevon.calibrate.closed_loop.log import motion, unsigned, window
 from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.estimate import Free
+from elevon.estimate.free import inner
+from elevon.logs.log import Log
 
 __all__ = ["cloud", "first_values", "windows"]
 
@@ -20,14 +22,14 @@ _PLACES = (0.6, 0.95)  # quantiles of unrest at which windows of a log are taken
 _SPEED, _POSITION, _INTEGRAL = (10.0, 1500.0), (1.0, 80.0), (0.05, 20.0)
 
 
-def windows(logs: Sequence[LoopLog], per_output: float) -> list[LoopLog]:
+def windows(logs: Sequence[Log], per_output: float) -> list[Log]:
     """Return short stretches of the logs: a busy one and a calmer one of each."""
     parts = []
     for log in logs:
         if log.duration <= 2.0 * _WINDOW:
             parts.append(log)
             continue
-        speed = log.motion(per_output)[0]
+        speed = motion(log, per_output)[0]
         begins = np.arange(0.0, log.duration - _WINDOW, 0.5 * _WINDOW)
         unrest = []
         for begin in begins:
@@ -35,18 +37,18 @@ def windows(logs: Sequence[LoopLog], per_output: float) -> list[LoopLog]:
             unrest.append(float(np.sqrt(np.nanmean(speed[inside] ** 2))))
         order = np.argsort(unrest)
         chosen = {int(order[round(q * (len(order) - 1))]) for q in _PLACES}
-        parts += [log.window(begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)]
+        parts += [window(log, begins[k], begins[k] + _WINDOW, _SETTLE) for k in sorted(chosen)]
     return parts
 
 
 def first_values(model: LoopModel) -> dict[str, float]:
     """Return what currents and speeds suggest; only paths the signals speak of."""
     constant = model.actuator.parameters.value("control.torque_constant")
-    top = max(float(np.nanmax(np.abs(log.motion(model.per_output)[0]))) for log in model.logs)
+    top = max(float(np.nanmax(np.abs(motion(log, model.per_output)[0]))) for log in model.logs)
     values: dict[str, float] = {}
     if top > 0.0 and np.isfinite(top):
         values["control.speed_limit"] = 1.05 * top
-    current = [log.signals["current"][log.used] for log in model.logs if "current" in log.signals]
+    current = [log.current[log.good] for log in model.logs if log.has("torque_current")]
     if current:
         peak = float(np.nanmax(np.abs(np.concatenate(current))))
         values["control.current_limit"] = max(1.05 * peak, 1e-3)
@@ -58,17 +60,17 @@ def _friction(model: LoopModel, constant: float) -> dict[str, float]:
     """Dry friction and a constant load, from the current while it moves in either direction."""
     levels: dict[int, list[Floats]] = {1: [], -1: []}
     for log in model.logs:
-        if "current" not in log.signals:
+        if not log.has("torque_current"):
             continue
-        speed = log.motion(model.per_output)[0]
+        speed = motion(log, model.per_output)[0]
         slow = 0.05 * float(np.nanmax(np.abs(speed)))
         for direction, level in levels.items():
-            level.append(log.signals["current"][log.used & (direction * speed > slow)])
+            level.append(log.current[log.good & (direction * speed > slow)])
     forth, back = (np.concatenate(levels[direction]) for direction in (1, -1))
     if len(forth) < 10 or len(back) < 10:
         return {}
     a, b = constant * float(np.nanmedian(forth)), constant * float(np.nanmedian(back))
-    signed = not any(log.magnitude for log in model.logs)
+    signed = not any(unsigned(log) for log in model.logs)
     values = {"friction.dynamic": max(0.5 * (abs(a) + abs(b)), 1e-6)}
     if signed:
         values["friction.dynamic"] = max(0.5 * (a - b), 0.1 * values["friction.dynamic"])

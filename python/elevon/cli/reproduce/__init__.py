@@ -2,24 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import typer
 
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import NamingGroup, UsageError
 from elevon.cli.reproduce.case import add_command
-from elevon.cli.reproduce.cranfield import CASES as _CRANFIELD
-from elevon.cli.reproduce.diagnosis import CASES as _DIAGNOSIS
-from elevon.cli.reproduce.fault_limits import CASES as _FAULT_LIMITS
-from elevon.cli.reproduce.nasa import CASES as _NASA
-from elevon.cli.reproduce.next_test import CASES as _NEXT_TEST
-from elevon.cli.reproduce.optimisers import CASES as _OPTIMISERS
-from elevon.cli.reproduce.pisa import CASES as _PISA
-from elevon.cli.reproduce.prognosis import CASES as _PROGNOSIS
-from elevon.cli.reproduce.signatures import CASES as _SIGNATURES
-from elevon.cli.reproduce.torino import CASES as _TORINO
+from elevon.cli.reproduce.cases import CASES
+
+#: What judges Elevon itself stands outside the package.
+STUDIES = (
+    "diagnosis-limits",
+    "diagnosis-optimisers",
+    "fault-limits",
+    "inspection-error",
+    "monitor-delay",
+    "next-test",
+    "prognosis",
+)
+
+
+class _Group(NamingGroup):
+    """Published cases; the name of a study is answered with where it is."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command of the first argument, or raise `UsageError`."""
+        if args and args[0] in STUDIES:
+            raise UsageError(
+                f"'{args[0]}' is no published case but a study of Elevon itself: run "
+                f"python -m studies {args[0]} in a checkout of the sources",
+                ctx,
+            )
+        return super().resolve_command(ctx, args)
+
 
 app = typer.Typer(
     no_args_is_help=True,
-    cls=NamingGroup,
+    cls=_Group,
     rich_markup_mode=None,
     help="Recompute a published table or figure; exit code 1 when a check fails.",
 )
@@ -30,17 +49,5 @@ def _group() -> None:
     """Recompute a published table or figure; exit code 1 when a check fails."""
 
 
-_CASES = (
-    *_TORINO,
-    *_NASA,
-    *_PISA,
-    *_CRANFIELD,
-    *_DIAGNOSIS,
-    *_FAULT_LIMITS,
-    *_NEXT_TEST,
-    *_SIGNATURES,
-    *_OPTIMISERS,
-    *_PROGNOSIS,
-)
-for _case in _CASES:
+for _case in CASES:
     add_command(app, _case)

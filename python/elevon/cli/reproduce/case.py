@@ -5,17 +5,18 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.output import Advance, print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 
 if TYPE_CHECKING:
     from elevon.report import Report
 
-__all__ = ["Options", "PublishedCase", "Values", "add_command", "cell", "print_columns"]
+__all__ = ["Options", "PublishedCase", "Values", "add_command", "check_file", "print_columns"]
 
 Options = Mapping[str, Any]
 Values = dict[str, Any]
@@ -31,49 +32,64 @@ _DATE = Annotated[str | None, typer.Option("--date", help="Date printed in the r
 
 @dataclass(frozen=True)
 class PublishedCase:
-    """One published case.
+    """One published case, or one study.
+
+    Functions are named ``MODULE:FUNCTION``, so that a list of cases imports none of them; each is
+    given those options that it has an argument for.
 
     Attributes
     ----------
-    name : str
-        The command.
-    text : str
-        What it does, in one sentence.
-    title : str
-        Shown while it works.
-    work : callable
-        Options and progress to a result, which has ``to_dict()`` with status, checks and rows.
-    show : callable
-        Prints the result's values but for the checks; gets the result itself, too.
-    page : callable or None
-        Result, date and options to the report; None: nothing is written.
+    name, text, title : str
+        The command; what it does, in one sentence; shown while it works.
+    work : str
+        To a result, which has ``to_dict()`` with status, checks and rows.
+    columns : tuple of str
+        Of the rows' table; empty: none.
+    table : str or None
+        Above that table.
+    page : str
+        Result to the report; empty: nothing is written.
     options : mapping of str to (annotation, default)
         Options beyond those that every case has.
+    names : mapping of str to str
+        Arguments of the work that an option of another name gives.
     seeded : bool
         Whether it draws random numbers.
-    prepare, finish : callable or None
-        Before the work (refuse what cannot be written), and after the report.
+    prepare, show, finish : callable or None
+        Before the work (refuse what cannot be written), after the table, and after the report.
     """
 
     name: str
     text: str
     title: str
-    work: Callable[[Options, Advance], Any]
-    show: Callable[[Values, Any], None]
-    page: Callable[[Any, Options], Report] | None = None
+    work: str
+    columns: tuple[str, ...] = ()
+    table: str | None = None
+    page: str = ""
     options: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=lambda: {"folder": "out"})
     seeded: bool = True
     prepare: Callable[[Options], None] | None = None
+    show: Callable[[Values, Any], None] | None = None
     finish: Callable[[Any, Options], None] | None = None
 
-    def signature(self) -> dict[str, tuple[Any, Any]]:
+    def signature(self) -> dict[str, tuple[object, object]]:
         """Return its options: name to annotation and default."""
         common: dict[str, tuple[Any, Any]] = {"as_json": (_JSON, False)}
-        if self.page is not None:
+        if self.page:
             common |= {"out": (_OUT, None), "force": (_FORCE, False), "date": (_DATE, None)}
         if self.seeded:
             common["seed"] = (_SEED, 0)
         return {**common, **self.options}
+
+    def call(self, function: str, *arguments: Any, **options: Any) -> Any:
+        """Call a function by its name, with the options that it has arguments for."""
+        module, _, name = function.partition(":")
+        called = getattr(import_module(module), name)
+        known = options | {to: options[name] for to, name in self.names.items() if name in options}
+        accepted = inspect.signature(called).parameters
+        given = {k: v for k, v in known.items() if k in accepted and v is not None}
+        return called(*arguments, **given)
 
 
 def add_command(app: typer.Typer, case: PublishedCase) -> None:
@@ -98,31 +114,36 @@ def add_command(app: typer.Typer, case: PublishedCase) -> None:
 def _run(case: PublishedCase, options: Options) -> int:
     """Compute, write, print; 0 when every check passed, else 1."""
     out: Path | None = options.get("out")
-    if out is not None:
-        _check_folder(out, options["force"])
+    if out is not None:  # before the work, not after it
+        check_file(out / "report.html", options)
+        check_file(out / "rows.csv", options)
     if case.prepare is not None:
         case.prepare(options)
     with progress_bar(case.title) as advance:
-        result = case.work(options, advance)
+        result = case.call(case.work, **options, progress=advance)
     values: Values = result.to_dict()
-    if out is not None and case.page is not None:
-        _write(out, case.page(result, options), values["rows"], options["force"])
+    if out is not None:
+        report = case.call(case.page, result, **options)
+        _write(out, report, values["rows"], options["force"])
     if case.finish is not None:
         case.finish(result, options)
     if options["as_json"]:
         print_json(values)
     else:
-        case.show(values, result)
         _print_checks(values)
+        if case.columns:
+            print_columns(values["rows"], case.columns, case.table)
+        if case.show is not None:
+            case.show(values, result)
     return 0 if values["status"] == "pass" else 1
 
 
-def _check_folder(out: Path, force: bool) -> None:
-    """Refuse an output that cannot be written before the work, not after it."""
+def check_file(path: Path | None, options: Options) -> None:
+    """Refuse an output that cannot be written."""
     from elevon.files import check_output
 
-    for name in ("report.html", "rows.csv"):
-        check_output(out / name, force=force)
+    if path is not None:
+        check_output(path, force=options["force"])
 
 
 def _write(out: Path, report: Report, rows: list[Values], force: bool) -> None:
@@ -143,22 +164,24 @@ def _write(out: Path, report: Report, rows: list[Values], force: bool) -> None:
 
 def print_columns(rows: list[Values], columns: tuple[str, ...], title: str | None = None) -> None:
     """Print some columns of rows as a table."""
-    cells = [[cell(row[name]) for name in columns] for row in rows]
+    cells = [[_cell(row[name]) for name in columns] for row in rows]
     print_table([name.replace("_", " ") for name in columns], cells, title=title)
 
 
-def cell(value: object) -> str:
+def _cell(value: object) -> str:
     """Return a value as a cell of a table."""
     if isinstance(value, bool):
         return "yes" if value else "NO"
     if isinstance(value, list):
-        return " to ".join(cell(item) for item in value)
+        return " to ".join(_cell(item) for item in value)
     if isinstance(value, float):
         return f"{value:.5g}"
     return "-" if value is None else str(value)
 
 
 def _print_checks(values: Values) -> None:
+    passed = sum(check["passed"] for check in values["checks"])
+    answer(f"{values['status']}: {passed} of {len(values['checks'])} checks")
     rows = [
         [
             check["name"],

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from elevon.demo.life.results import LifeDemo
-    from elevon.diagnose.bymodel import TestLog
+    from elevon.logs.log import Log
 
 __all__ = ["cone_figure", "diagnoses_figure", "remaining_figure", "signals_figure"]
 
@@ -99,16 +99,13 @@ def diagnoses_figure(demo: LifeDemo) -> Figure:
     return figure
 
 
-def signals_figure(healthy: TestLog, worn: TestLog, ratio: float, usage: float) -> Figure:
+def signals_figure(healthy: Log, worn: Log, ratio: float, usage: float) -> Figure:
     """Draw two logs of the same test: the two positions' difference, and the current."""
     with new_figure(2, 1, width=9.0, height=4.8, sharex=True) as (figure, axes):
-        for log, colour, name in (
+        for data, colour, name in (
             (healthy, "blue", "new"),
             (worn, "orange", f"at flight {usage:.0f}"),
         ):
-            data = log.log
-            assert data.motor is not None
-            assert data.output is not None
             keep = (data.time > 5.0) & (data.time < 15.0)
             time = data.time[keep] - 5.0
             gap = np.degrees(data.motor / ratio - data.output)[keep]

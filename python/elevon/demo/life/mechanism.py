@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -49,18 +50,20 @@ class Motion:
 def motion(demo: LifeDemo, usage: float) -> Motion:
     """Run one sweep of the mission with the hidden unit as it is at a use."""
     from elevon.demo.life.unit import demo_mission, faults_at
-    from elevon.simulate import Run
-    from elevon.simulate.batch import simulate_prepared
-    from elevon.simulate.prepare import prepare
+    from elevon.errors import ElevonWarning
+    from elevon.simulate import simulate
 
     unit: Actuator = demo.hidden
     scenario = demo_mission().scenarios().replaced(duration=2.0 * _SECONDS)
     scenario = scenario.with_faults(faults_at(demo.life, usage))
     record = f"output_position,motor_position,command@{_FRAMES / _SECONDS:g} Hz"
-    ready = prepare(Run(unit, scenario), "low", record, notices=False)
-    result = simulate_prepared([ready], fidelity="low")[0]
-    rows = result["clocks"][ready.plan[0].name]["values"][_FRAMES : 2 * _FRAMES + 1]
-    output, motor, command = rows[:, 0], rows[:, 1], rows[:, 2]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ElevonWarning)
+        run = simulate(unit, scenario, fidelity="low", record=record)
+    output, motor, command = (
+        np.asarray(run[name].values[_FRAMES : 2 * _FRAMES + 1])
+        for name in ("output_position", "motor_position", "command")
+    )
     ratio = unit.parameters.value("gear.ratio")
     backlash = unit.parameters.value("backlash.total") + float(demo.life.at(usage)[0])
     return Motion(

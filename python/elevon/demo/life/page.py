@@ -11,7 +11,7 @@ from elevon.demo.life.figures import (
     signals_figure,
 )
 from elevon.demo.life.mechanism import mechanism, motion
-from elevon.diagnose.bymodel import read_test_logs
+from elevon.logs.read import read_drive_logs
 from elevon.prognose.figures import severity_unit
 from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
@@ -100,7 +100,7 @@ def moving_picture(demo: LifeDemo) -> Markup:
 
 def _signals(report: Report, demo: LifeDemo) -> None:
     last = demo.visits[-1]
-    healthy, worn = read_test_logs([demo.healthy[0], last.log])
+    healthy, worn = read_drive_logs([demo.healthy[0], last.log], one_rate=False)
     ratio = demo.base.parameters.value("gear.ratio")
     section = report.section(
         "What the logs show",
@@ -165,9 +165,9 @@ def _prediction(report: Report, demo: LifeDemo) -> None:
     section.table(ReportTable(columns, rows))
     lines = []
     for item in demo.visits[-1].prognosis.reserve:
-        unit = severity_unit(item["unit"])
-        now, end = to_display(item["value"], unit), to_display(item["threshold"], unit)
-        lines.append((item["name"], f"{now:.3g} {unit}", f"{end:.3g} {unit}"))
+        unit = severity_unit(item.unit)
+        now, end = to_display(item.value, unit), to_display(item.threshold, unit)
+        lines.append((item.name, f"{now:.3g} {unit}", f"{end:.3g} {unit}"))
     section.table(
         ReportTable(
             ("requirement", "at the last inspection", "life ends at"),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.demo.results import Recovered
+from elevon.calibrate.outcome import Calibration
 from elevon.demo.steps import Story
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from elevon.diagnose.bymodel import Diagnosis
     from elevon.prognose import Inspection, Prognosis, ResponseTables
 
-__all__ = ["InspectionVisit", "LifeDemo", "Statement", "life_from_json", "life_to_json"]
+__all__ = ["InspectionVisit", "LifeDemo", "Statement"]
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class LifeDemo(Story):
     ----------
     life : Life
         The true course.
-    calibration : Recovered
+    calibration : Calibration
         The healthy unit as its logs show it.
     response : ResponseTables
         The calibrated unit's tables.
@@ -101,7 +101,7 @@ class LifeDemo(Story):
     """
 
     life: Life = field(init=False)
-    calibration: Recovered = field(init=False)
+    calibration: Calibration = field(init=False)
     response: ResponseTables = field(init=False)
     healthy: list[Path] = field(default_factory=list)
     visits: list[InspectionVisit] = field(default_factory=list)
@@ -128,7 +128,7 @@ class LifeDemo(Story):
     def checks(self) -> list[Check]:
         """What must hold of any one life; how well it was predicted is shown, and judged by many.
 
-        `elevon reproduce prognosis` requests accuracy and coverage, of sixty lives.
+        `python -m studies prognosis` requests accuracy and coverage, of sixty lives.
         """
         track = self.track
         named = np.mean([v.diagnosis.status == "faulty" for v in self.visits[1:]])
@@ -164,15 +164,3 @@ class LifeDemo(Story):
             "wall_s": self.seconds,
             "report": str(self.folder / "report.html"),
         }
-
-
-def life_to_json(life: Life) -> dict[str, Any]:
-    """Return a life as plain types."""
-    data = asdict(life)
-    return {**data, "usage": life.usage.tolist(), "severity": life.severity.tolist()}
-
-
-def life_from_json(data: Any) -> Life:
-    """Return the life again."""
-    usage, severity = np.array(data["usage"]), np.array(data["severity"])
-    return Life(usage, severity, float(data["end"]), int(data["first"]))

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.calibrate.outcome import Calibration
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.life.results import (
     InspectionVisit,
     LifeDemo,
     Statement,
-    life_from_json,
-    life_to_json,
 )
 from elevon.demo.life.unit import (
     INSPECTED,
@@ -27,13 +26,14 @@ from elevon.demo.life.unit import (
     mission_file,
     of_day,
 )
-from elevon.demo.results import Recovered
 from elevon.demo.steps import Work
 from elevon.errors import Interrupted
+from elevon.plain import plain, read_plain
+from elevon.prognose.life import Life
 from elevon.progress import Progress, part
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel import TestLog
+    from elevon.logs.log import Log
     from elevon.prognose import Prognosis
 
 __all__ = ["life_files", "run_life"]
@@ -97,8 +97,8 @@ def run_life(
         Work(
             "life",
             lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
-            life_to_json,
-            life_from_json,
+            plain,
+            lambda data: read_plain(Life, data, "life"),
         ),
     )
     _calibrate(demo, part(progress, 0.15, 0.4))
@@ -150,10 +150,9 @@ def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
     """Take the healthy logs and calibrate on three of them."""
     from elevon.bench.run import run_procedure
     from elevon.calibrate import calibrate
-    from elevon.calibrate.log import bench_log
     from elevon.calibrate.write import write_calibration
     from elevon.demo.procedure import HELD_OUT, demo_procedure
-    from elevon.logs.importing import import_log
+    from elevon.logs.read import read_drive_logs
 
     logs = demo.folder / "logs" / "healthy"
 
@@ -169,19 +168,19 @@ def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
     names = [trace.name for trace in demo_procedure().traces if trace.name != HELD_OUT]
     files = [logs / f"{name}.csv" for name in names]
 
-    def work() -> Recovered:
-        used = [bench_log(import_log(path)) for path in files]
+    def work() -> Calibration:
+        used = read_drive_logs(files, one_rate=False)
         result = calibrate(used, demo.base, progress=part(progress, 0.4, 1.0))
         write_calibration(target, result, force=True)
-        return Recovered.of(result)
+        return result
 
     demo.calibration = demo.resumed(
         "calibration on the first healthy logs",
         Work(
             "calibration",
             work,
-            lambda calibration: calibration.to_json(demo.base),
-            lambda data: Recovered.from_json(data, demo.base),
+            Calibration.to_dict,
+            Calibration.from_dict,
             inputs_of(files),
             [target],
         ),
@@ -201,11 +200,11 @@ def _tables(demo: LifeDemo, progress: Progress | None) -> None:
 
 def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
     """Inspect, diagnose and predict, at irregular uses, until the unit has failed."""
-    from elevon.diagnose.bymodel import read_test_logs
+    from elevon.logs.read import read_drive_logs
     from elevon.prognose import ParticleFilter, Process
 
     rng = np.random.default_rng([demo.seed, 11])
-    baselines = read_test_logs(demo.healthy)
+    baselines = read_drive_logs(demo.healthy, one_rate=False)
     flt = ParticleFilter(Process(demo.response), seed=demo.seed)
     usage, number = 0.0, 0
     while True:
@@ -218,8 +217,9 @@ def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
             raise Interrupted("interrupted between two inspections")
 
 
-def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, number: int) -> None:
-    from elevon.diagnose.bymodel import diagnose, read_test_logs
+def _visit(demo: LifeDemo, baselines: list[Log], flt: Any, usage: float, number: int) -> None:
+    from elevon.diagnose.bymodel import diagnose
+    from elevon.logs.read import read_drive_logs
     from elevon.prognose.history import write_stamp
     from elevon.prognose.observation import inspection
     from elevon.prognose.predict import prognosis
@@ -233,7 +233,7 @@ def _visit(demo: LifeDemo, baselines: list[TestLog], flt: Any, usage: float, num
         "diagnosis of each log",
         Work(
             f"inspection-{number}",
-            lambda: Statement.of(diagnose(read_test_logs([log]), actuator, baselines=baselines)),
+            lambda: Statement.of(diagnose(read_drive_logs([log]), actuator, baselines=baselines)),
             asdict,
             Statement.from_json,
             inputs_of([log, *demo.healthy], actuator.hash),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -10,11 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.demo.hidden import hidden_actuator
 from elevon.faults import Fault
 from elevon.prognose import Mission, Process, respond
+from elevon.prognose.law import Law
 from elevon.prognose.life import Life, run_to_failure
-from elevon.reproduce.prognosis.truth import other_law
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -28,12 +30,16 @@ __all__ = [
     "live",
     "mission_file",
     "of_day",
+    "other_law",
 ]
 
 INSPECTED = 330.0
 """Flights between inspections, about."""
 _FACTORS = (1.35, 0.7)
 """Of wear and friction on the laws the prediction starts from: this unit wears faster."""
+_GRAIN = 1.5  # of the truth's scatter over the law's
+_FEEDBACK = 0.5  # greatest relative rise of a truth's growth up to the greatest severity, linear
+_OWN_HEAT = (0.1, 0.3)  # median and deviation of the logarithm of a unit's over the law's
 
 
 def mission_file() -> Path:
@@ -84,6 +90,19 @@ def live(unit: Actuator, seed: int, progress: Progress | None = None) -> Life:
     return run_to_failure(
         process, replace(new, growth=growth, form=np.zeros((1, 2)), active=every), rng
     )
+
+
+def other_law(law: Law, rng: np.random.Generator) -> Law:
+    """Return the law as it truly is in one unit: another form, another scatter."""
+    if law.name == "insulation":
+        heat = law.coefficients["own_heat"].value * float(np.exp(rng.normal(*_OWN_HEAT)))
+        return replace(law.with_values({"own_heat": heat}), grain=_GRAIN * law.grain)
+    believed, feedback = law.rate, rng.uniform(0.0, _FEEDBACK)
+
+    def rate(damage: Floats, drivers: Mapping[str, Floats], c: Mapping[str, float]) -> Floats:
+        return believed(damage, drivers, c) * (1.0 + feedback * damage / law.highest)
+
+    return replace(law, rate=rate, grain=_GRAIN * law.grain)
 
 
 def faults_at(life: Life, usage: float) -> list[Fault]:

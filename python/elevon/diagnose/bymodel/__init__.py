@@ -2,6 +2,5 @@
 
 from elevon.diagnose.bymodel.answer import Cause, Diagnosis
 from elevon.diagnose.bymodel.diagnosis import diagnose
-from elevon.diagnose.bymodel.log import TestLog, read_test_logs
 
-__all__ = ["Cause", "Diagnosis", "TestLog", "diagnose", "read_test_logs"]
+__all__ = ["Cause", "Diagnosis", "diagnose"]

@@ -2,17 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
-__all__ = ["SEEN", "Alternative", "Cause", "Diagnosis", "Explanation", "Moved"]
+from elevon.plain import WORKING, Plain, in_unit, key
+from elevon.results import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from elevon.diagnose.pictures import Traces
+    from elevon.report import Report
+
+__all__ = [
+    "SEEN",
+    "Alternative",
+    "Cause",
+    "Diagnosis",
+    "Explanation",
+    "FaultPlace",
+    "Moved",
+    "Reason",
+    "SuspectedFault",
+]
 
 SEEN = 3.0  # deviations that a fault's shift must reach to be observable
 
 
+class FaultPlace(NamedTuple):
+    """A kind of fault and its place."""
+
+    kind: str
+    place: str
+
+    @property
+    def key(self) -> str:
+        """``KIND@PLACE``."""
+        return f"{self.kind}@{self.place}"
+
+
+class SuspectedFault(NamedTuple):
+    """A fault with the median of its severity and the interval of 90 %."""
+
+    kind: str
+    place: str
+    severity: float
+    unit: str
+    interval: tuple[float, float]
+
+
 @dataclass(frozen=True)
-class Cause:
+class Cause(Plain):
     """One distinguishable cause.
 
     Attributes
@@ -25,7 +66,7 @@ class Cause:
         Median.
     interval : (float, float)
         Of 90 %.
-    ambiguous_with : tuple of (str, str)
+    ambiguous_with : tuple of FaultPlace
         Kinds and places that the logs do not separate from it.
     """
 
@@ -35,56 +76,27 @@ class Cause:
     probability: float
     severity: float
     interval: tuple[float, float]
-    ambiguous_with: tuple[tuple[str, str], ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "kind": self.kind,
-            "place": self.place,
-            "probability": self.probability,
-            "severity": self.severity,
-            "unit": self.unit,
-            "interval": list(self.interval),
-            "ambiguous_with": [{"kind": k, "place": p} for k, p in self.ambiguous_with],
-        }
+    ambiguous_with: tuple[FaultPlace, ...] = ()
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Explanation(Plain):
     """One set of faults that may be there.
 
     Attributes
     ----------
-    faults : tuple of (str, str, str)
-        Kind, place and unit of each; none for healthy.
+    faults : tuple of SuspectedFault
+        None for healthy.
     probability : float
         Of this set and no other.
-    severity : tuple of float
-        Median of each.
-    interval : tuple of (float, float)
-        Of 90 %, of each.
     """
 
-    faults: tuple[tuple[str, str, str], ...]
+    faults: tuple[SuspectedFault, ...]
     probability: float
-    severity: tuple[float, ...]
-    interval: tuple[tuple[float, float], ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        rows = zip(self.faults, self.severity, self.interval, strict=True)
-        return {
-            "faults": [
-                {"kind": k, "place": p, "severity": s, "unit": u, "interval": list(ends)}
-                for (k, p, u), s, ends in rows
-            ],
-            "probability": self.probability,
-        }
 
 
 @dataclass(frozen=True)
-class Alternative:
+class Alternative(Plain):
     """A healthy unit or a single fault that is not the answer, and what speaks against it.
 
     Attributes
@@ -111,14 +123,12 @@ class Alternative:
     name: str
     left: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 @dataclass(frozen=True)
-class Moved:
+class Moved(Plain):
     """One feature against the healthy unit."""
+
+    COMPUTED: ClassVar = ("score",)
 
     log: str
     name: str
@@ -133,22 +143,18 @@ class Moved:
         """Deviations from the healthy unit."""
         return (self.value - self.expected) / self.deviation
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "log": self.log,
-            "name": self.name,
-            "unit": self.unit,
-            "value": self.value,
-            "expected": self.expected,
-            "deviation": self.deviation,
-            "explained": self.explained,
-            "score": self.score,
-        }
+
+@dataclass(frozen=True)
+class Reason(Plain):
+    """Why no cause is named: a feature of the logs, its value and the limit that it passes."""
+
+    feature: str
+    value: float
+    limit: float
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Result):
     """The answer.
 
     Attributes
@@ -156,7 +162,9 @@ class Diagnosis:
     logs : tuple of str
         The logs.
     status : str
-        ``healthy`` or ``faulty``.
+        ``healthy``; ``faulty``; ``unknown_fault``: no candidate explains the logs, nor a healthy
+        unit; ``model_does_not_fit``: the model does not show what the healthy unit shows. The last
+        two name no faults and have a `reason`.
     p_fault : float
         Probability of any fault.
     false_alarm : float
@@ -173,8 +181,8 @@ class Diagnosis:
         ``kind``, ``place``, ``reason``.
     detectable : dict of str to float
         Smallest severity of each fault that moves the features by `SEEN` deviations.
-    moved : tuple of Moved
-        The features.
+    features : tuple of Moved
+        Against the healthy unit.
     findings : tuple of str
         What the caller should know.
     seconds : float
@@ -183,47 +191,65 @@ class Diagnosis:
         Sets of faults that are still possible, most probable first.
     alternatives : tuple of Alternative
         A healthy unit and the other single faults, and what speaks against each.
-    units : mapping of str to str
+    severity_units : mapping of str to str
         Unit of each candidate's severity, by ``KIND@PLACE``.
     p_other : float
         Probability of a fault that is no candidate; part of `p_fault`. Where it is the most
         probable, a faulty unit has an empty `best`.
+    reason : Reason or None
+        Why no cause is named.
+    actuator : str
+        Its name.
+    method : str
+        ``model``, ``surrogate`` or ``both``.
+    draw : callable or None
+        Gives the signals over those of the model, for its page.
     """
 
     logs: tuple[str, ...]
-    status: str
+    status: Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit"]
     p_fault: float
     false_alarm: float
     chance: float
     faults: tuple[Cause, ...]
-    best: tuple[str, ...]
-    p_best: float
+    best: Annotated[tuple[str, ...], key("best.faults")]
+    p_best: Annotated[float, key("best.probability")]
     unobservable: tuple[dict[str, str], ...]
     detectable: dict[str, float]
-    moved: tuple[Moved, ...]
+    features: tuple[Moved, ...]
     findings: tuple[str, ...]
-    seconds: float = field(compare=False)
+    seconds: Annotated[float, in_unit("s")] = field(compare=False)
     hypotheses: tuple[Explanation, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
-    units: Mapping[str, str] = field(default_factory=dict)
+    severity_units: Mapping[str, str] = field(default_factory=dict)
     p_other: float = 0.0
+    reason: Reason | None = None
+    actuator: str = ""
+    method: str = "model"
+    draw: Annotated[Callable[[], Sequence[Traces]] | None, WORKING] = field(
+        default=None, compare=False, repr=False
+    )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": self.status,
-            "p_fault": self.p_fault,
-            "p_other": self.p_other,
-            "false_alarm": self.false_alarm,
-            "chance": self.chance,
-            "faults": [cause.to_dict() for cause in self.faults],
-            "best": {"faults": list(self.best), "probability": self.p_best},
-            "hypotheses": [item.to_dict() for item in self.hypotheses],
-            "alternatives": [item.to_dict() for item in self.alternatives],
-            "unobservable": [dict(item) for item in self.unobservable],
-            "detectable": dict(self.detectable),
-            "features": [item.to_dict() for item in self.moved],
-            "findings": list(self.findings),
-            "logs": list(self.logs),
-            "seconds": self.seconds,
-        }
+    KIND: ClassVar = "diagnosis"
+    TABLE: ClassVar = "faults"
+    COLUMNS: ClassVar = ("kind", "place", "probability", "severity", "unit", "interval")
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        from elevon.diagnose.bymodel.words import sentence
+
+        return sentence(self)
+
+    def plot(self) -> Figure:
+        """Return how far each feature deviates from a healthy unit."""
+        from elevon.diagnose.pictures import features_figure
+
+        return features_figure(self.features)
+
+    def report(self, *, date: str | None = None) -> Report:
+        """Return its page, with the logs' signals where it was computed in this process."""
+        from elevon.diagnose.bymodel.page import diagnosis_page
+
+        traces = () if self.draw is None else self.draw()
+        return diagnosis_page(self, self.actuator, date, traces=traces)

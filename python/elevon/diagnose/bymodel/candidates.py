@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.errors import InputError, unknown
 
-__all__ = ["CANDIDATES", "CandidateFault", "chosen"]
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["CANDIDATES", "CandidateFault", "chosen", "of_a_magnet"]
+
+_LAW = "motor.eccentricity_law"
 
 
 @dataclass(frozen=True)
@@ -137,3 +143,14 @@ def chosen(texts: Sequence[str] | None) -> tuple[CandidateFault, ...]:
             raise InputError(f"--fault {key}: {item.key} is already among the candidates")
         out.append(item)
     return tuple(out)
+
+
+def of_a_magnet(actuator: Actuator) -> Actuator:
+    """Return the actuator as diagnosis runs it: an eccentric rotor has a periodic flux.
+
+    The published law has an EMF with a mean over a turn, which no magnet has. An actuator that
+    states its law keeps it.
+    """
+    if actuator.parameters[_LAW].confidence != "default":
+        return actuator
+    return actuator.with_values({_LAW: "periodic"}, source="law of diagnosis", request=False)

@@ -13,11 +13,12 @@ from elevon.diagnose.bymodel.candidates import CandidateFault
 from elevon.diagnose.bymodel.detection import Detector
 from elevon.diagnose.bymodel.features import OWN_ERROR, SHARES, SIZES, FeatureVector
 from elevon.diagnose.bymodel.healthy import Elsewhere, Healthy, healthy
-from elevon.diagnose.bymodel.log import TestLog
+from elevon.diagnose.bymodel.log import RUN_IN
 from elevon.diagnose.bymodel.replay import Replay, logged_features, modelled, replay
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
 __all__ = ["LogCase", "case_of", "detector_of", "joined", "shift_of", "uncertainty_of"]
 
@@ -46,12 +47,15 @@ class LogCase:
         What a healthy unit would show.
     model : Replay
         What faults do to the features.
+    findings : tuple of str
+        What the log lacks, and baselines that were left out.
     """
 
     name: str
     features: FeatureVector
     unit: Healthy
     model: Replay
+    findings: tuple[str, ...] = ()
 
     @property
     def covariance(self) -> Floats:
@@ -89,42 +93,40 @@ _OF_THE_CURRENT = frozenset(
 
 
 def case_of(
-    item: TestLog,
+    item: Log,
     actuator: Actuator,
     candidates: Sequence[CandidateFault],
-    baselines: Sequence[TestLog],
-    findings: list[str],
+    baselines: Sequence[Log],
 ) -> LogCase:
-    """Hold a log against the model and the baselines; what it lacks goes to the findings."""
+    """Hold a log against the model and the baselines."""
     features = logged_features(item, actuator)
     same = [b for b in baselines if _same_test(item, b)]
     model = replay(item, actuator, candidates, same)
     references = [(b.name, _transferred(b, actuator, model.healthy)) for b in same]
     names = [n for n in features.names if n in model.healthy.names]
     names = [n for n in names if all(n in e.names for _, e in references)]
-    if any(log.log.current_signal == "current_ref" for log in (item, *same)):
+    if any(not log.has("torque_current") for log in (item, *same)):
         # A set point has the derivative's spikes, which the motor's current never follows.
         names = [n for n in names if n not in _OF_THE_CURRENT]
     elsewhere = [
         Elsewhere(logged_features(b, actuator), modelled(b, actuator))
         for b in baselines
-        if all(b is not s for s in same)
-        and b.log.current_signal != "current_ref"
-        and not b.brake_unknown
+        if all(b is not s for s in same) and b.has("torque_current") and not b.brake.unknown
     ]
-    sound = _sound(model, names, references, candidates, findings, brake_unknown=item.brake_unknown)
-    _lost(item, same, findings)
+    unknown = item.brake.unknown
+    sound, findings = _sound(model, names, references, candidates, brake_unknown=unknown)
+    findings += _lost(item, same)
     if features.floats:
         findings.append(
             f"{item.name}: the output is not carried through its backlash by friction but flies in "
             "it on its own; "
             "the backlash is read from the width of the two positions' difference"
         )
-    unit = healthy(model, names, sound, elsewhere, brake_unknown=item.brake_unknown)
-    return LogCase(item.name, features.only(names), unit, model)
+    unit = healthy(model, names, sound, elsewhere, brake_unknown=unknown)
+    return LogCase(item.name, features.only(names), unit, model, tuple(findings))
 
 
-def _transferred(item: TestLog, actuator: Actuator, here: FeatureVector) -> FeatureVector:
+def _transferred(item: Log, actuator: Actuator, here: FeatureVector) -> FeatureVector:
     """Return a baseline's features, moved by what the model says of the two logs' commands."""
     features, there = logged_features(item, actuator), modelled(item, actuator)
     values = features.values.copy()
@@ -134,11 +136,11 @@ def _transferred(item: TestLog, actuator: Actuator, here: FeatureVector) -> Feat
     return replace(features, values=values)
 
 
-def _same_test(a: TestLog, b: TestLog) -> bool:
+def _same_test(a: Log, b: Log) -> bool:
     """Whether two logs are of one test: by their notes, else by brake, motion and speed."""
-    if a.braked != b.braked or a.brake_unknown != b.brake_unknown:
+    if a.brake.measured != b.brake.measured or a.brake.unknown != b.brake.unknown:
         return False
-    notes = (a.log.note, b.log.note)
+    notes = (a.note, b.note)
     if notes[0] is not None and notes[1] is not None and notes[0].waveform and notes[1].waveform:
         if notes[0].waveform != notes[1].waveform:
             return False
@@ -146,8 +148,7 @@ def _same_test(a: TestLog, b: TestLog) -> bool:
         return all(_near(first[n], second[n], _NOTED) for n in first.keys() & second.keys())
     pairs = []
     for item in (a, b):
-        assert item.log.output is not None
-        pairs.append((float(np.std(item.log.output)), float(np.sqrt(np.mean(item.log.speed**2)))))
+        pairs.append((float(np.std(item.output)), float(np.sqrt(np.mean(item.speed**2)))))
     return all(_near(x, y, _SAME) for x, y in zip(*pairs, strict=True))
 
 
@@ -160,16 +161,16 @@ def _sound(
     names: Sequence[str],
     references: Sequence[tuple[str, FeatureVector]],
     candidates: Sequence[CandidateFault],
-    findings: list[str],
     *,
     brake_unknown: bool,
-) -> list[FeatureVector]:
-    """Leave out baselines that deviate from the model and from the other baselines alike.
+) -> tuple[list[FeatureVector], list[str]]:
+    """Leave out baselines that deviate from the model and from the other baselines, and say so.
 
     One that a candidate explains no better than none or another thing is not faulty: it shows
     how far the unit deviates from the model.
     """
-    sound = []
+    sound: list[FeatureVector] = []
+    findings: list[str] = []
     for k, (name, features) in enumerate(references):
         others = [e for j, (_, e) in enumerate(references) if j != k]
         alone = _chance(model, names, features, [], candidates, brake_unknown=brake_unknown)
@@ -196,7 +197,7 @@ def _sound(
             f"(a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
             "it is left out"
         )
-    return sound
+    return sound, findings
 
 
 def _faulty(
@@ -244,24 +245,25 @@ def _chance(
     return detector.chance(float(detector.score((root @ residual)[None, :])[0]))
 
 
-def _lost(item: TestLog, same: Sequence[TestLog], findings: list[str]) -> None:
-    """Note what a log lacks and what it costs."""
+def _lost(item: Log, same: Sequence[Log]) -> list[str]:
+    """What a log lacks and what it costs."""
+    findings = []
     if not same:
         findings.append(
             f"{item.name}: no baseline of this test: how far a healthy unit deviates from the "
             "model is assumed, small faults are not seen"
         )
-    if item.log.current_signal == "current_ref":
+    if not item.has("torque_current"):
         findings.append(
             f"{item.name}: no measured torque current (r78): friction, current ripple and faults "
             "of the drive's current loop and of current sensors are not seen"
         )
-    if item.brake_unknown:
+    if item.brake.unknown:
         findings.append(
             f"{item.name}: the brake acted and its torque is not known (no load-cell file, or no "
             "arm): friction is held against baselines of this test only"
         )
-    if item.voltage is None:
+    if not item.has("torque_voltage"):
         findings.append(
             f"{item.name}: no voltage (r1733): shorts, eccentricity and lost flux are judged by "
             "the current's ripple alone"
@@ -270,9 +272,10 @@ def _lost(item: TestLog, same: Sequence[TestLog], findings: list[str]) -> None:
         findings.append(
             f"{item.name}: no waveform explains the command: drift of the position gain is not seen"
         )
-    missing = 1.0 - float(np.mean(item.log.good))
+    missing = 1.0 - float(np.mean(item.good[item.time >= RUN_IN]))
     if missing > 0.01:
         findings.append(f"{item.name}: {100 * missing:.0f} % of the samples are missing; left out")
+    return findings
 
 
 def detector_of(

@@ -20,7 +20,7 @@ from elevon.arrays import Floats
 from elevon.diagnose.bymodel.features import regress
 
 if TYPE_CHECKING:
-    from elevon.calibrate.log import BenchLog
+    from elevon.logs.log import Log
 
 __all__ = ["NotedWaveform", "noted_command"]
 
@@ -57,25 +57,26 @@ class NotedWaveform:
     window: tuple[float, float]
 
 
-def noted_command(log: BenchLog, limit: float) -> NotedWaveform | None:
+def noted_command(log: Log, limit: float) -> NotedWaveform | None:
     """Fit the noted waveform; None where there is no note, or it does not explain the log.
 
     Parameters
     ----------
-    log : BenchLog
+    log : Log
         With the output's position.
     limit : float
         Of the speed set point [rad/s]; what stands at it is left out.
     """
-    if log.note is None or log.output is None or log.note.waveform not in ("sine", "chirp"):
+    note = log.note
+    if note is None or not log.has("output_position") or note.waveform not in ("sine", "chirp"):
         return None
     # A sample beside one at the limit may be the mean of both.
     cut = np.pad(np.abs(log.speed_ref) >= 0.999 * limit, 1)
     inside = log.good & ~(cut[:-2] | cut[1:-1] | cut[2:]) & np.isfinite(log.output)
-    known = log.note.parameters
+    known = note.parameters
     if inside.sum() < _LEAST:
         return None
-    if log.note.waveform == "sine":
+    if note.waveform == "sine":
         frequency = known.get("frequency", 0.0)
         return _solved(log, inside, frequency, _sine) if frequency * log.duration > 0.5 else None
     sweep = known.get("sweep_time", 0.0)
@@ -100,14 +101,13 @@ def _chirp(first: float, last: float, sweep: float) -> Phase:
     return phase
 
 
-def _columns(log: BenchLog, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floats]:
+def _columns(log: Log, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floats]:
     ref = log.speed_ref[at]
     return [np.sin(turn), np.cos(turn), np.ones(len(turn)), -ref, np.sign(ref)]
 
 
-def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
+def _scanned(log: Log, inside: Bools, phase: Phase) -> float:
     """Coarse search of the chirp's start, on samples behind the latest one allowed."""
-    assert log.output is not None
     at = np.flatnonzero(inside & (log.time > _LATEST * log.duration))
     at = at[:: max(1, len(at) // _THIN)]
     target, costs = log.output[at], []
@@ -120,9 +120,8 @@ def _scanned(log: BenchLog, inside: Bools, phase: Phase) -> float:
     return float(starts[int(np.argmin(costs))])
 
 
-def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedWaveform | None:
+def _solved(log: Log, inside: Bools, first: float, phase: Phase) -> NotedWaveform | None:
     """Gauss and Newton in the one unknown, first on the late half, then on all it explains."""
-    assert log.output is not None
     value = first
     at = np.flatnonzero(inside & (log.time > 0.5 * log.duration))
     for final in (False, True):
@@ -144,10 +143,9 @@ def _solved(log: BenchLog, inside: Bools, first: float, phase: Phase) -> NotedWa
 
 
 def _step(
-    log: BenchLog, at: npt.NDArray[np.intp], value: float, phase: Phase
+    log: Log, at: npt.NDArray[np.intp], value: float, phase: Phase
 ) -> tuple[Floats, Floats, Floats, float]:
     """Regression at one value of the unknown, and the step that its slope asks for."""
-    assert log.output is not None
     turn, slope = phase(value, log.time[at])
     columns = _columns(log, turn, at)
     beta, _ = regress(columns, log.output[at])
@@ -158,10 +156,9 @@ def _step(
 
 
 def _explained(
-    log: BenchLog, at: npt.NDArray[np.intp], turn: Floats, beta: Floats, spread: float
+    log: Log, at: npt.NDArray[np.intp], turn: Floats, beta: Floats, spread: float
 ) -> npt.NDArray[np.intp]:
     """Samples behind the last one that the fit of the late half does not explain."""
-    assert log.output is not None
     off = log.output[at] - beta @ np.stack(_columns(log, turn[at], at))
     strays = np.flatnonzero(np.abs(off[: len(off) // 2]) > max(_OUTLIER * spread, 1e-9))
     return at[strays[-1] + 1 :] if strays.size else at

@@ -29,7 +29,7 @@ from elevon.diagnose.bymodel.explain import (
     unexplained,
 )
 from elevon.diagnose.bymodel.likelihood import Hypothesis
-from elevon.diagnose.bymodel.log import TestLog, prepared
+from elevon.diagnose.bymodel.log import prepared
 from elevon.diagnose.bymodel.not_modelled import not_modelled
 from elevon.diagnose.bymodel.posterior import Posterior, posterior
 from elevon.errors import InputError
@@ -37,6 +37,7 @@ from elevon.threads import one_blas_thread
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
 __all__ = ["ANYWHERE", "answer_of", "check_request", "diagnose"]
 
@@ -45,10 +46,10 @@ ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 
 @one_blas_thread()
 def diagnose(
-    logs: Sequence[TestLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
-    baselines: Sequence[TestLog] = (),
+    baselines: Sequence[Log] = (),
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
 ) -> Diagnosis:
@@ -56,11 +57,11 @@ def diagnose(
 
     Parameters
     ----------
-    logs : sequence of TestLog
+    logs : sequence of Log
         Of one unit in one condition.
     actuator : Actuator
         The healthy unit, calibrated.
-    baselines : sequence of TestLog
+    baselines : sequence of Log
         Of the healthy unit; those of the same test serve.
     faults : sequence of str, optional
         ``KIND@PLACE`` of the candidates; default: all.
@@ -75,20 +76,16 @@ def diagnose(
     begin = clock.perf_counter()
     check_request(logs, actuator, false_alarm, "diagnosis by the model")
     candidates = chosen(faults)
-    findings: list[str] = []
     healthy_logs = [prepared(item, actuator) for item in baselines]
-    cases = [
-        case_of(prepared(item, actuator), actuator, candidates, healthy_logs, findings)
-        for item in logs
-    ]
-    result = answer_of(cases, candidates, false_alarm, findings, other=True)
+    cases = [case_of(prepared(item, actuator), actuator, candidates, healthy_logs) for item in logs]
+    result = answer_of(cases, candidates, false_alarm, other=True)
     blind = result.unobservable
     if not faults:
         blind += not_modelled()
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 
-def check_request(logs: Sequence[TestLog], actuator: Actuator, rate: float, who: str) -> None:
+def check_request(logs: Sequence[Log], actuator: Actuator, rate: float, who: str) -> None:
     """Refuse what no method for rotary actuators can answer; `who` is the method."""
     if not logs:
         raise InputError("diagnosis needs at least one log")
@@ -104,7 +101,6 @@ def answer_of(
     cases: Sequence[LogCase],
     candidates: Sequence[CandidateFault],
     rate: float,
-    findings: Sequence[str],
     *,
     most: int | None = None,
     other: bool = False,
@@ -119,8 +115,6 @@ def answer_of(
         Faults.
     rate : float
         Of false alarms.
-    findings : sequence of str
-        What was seen before.
     most : int, optional
         Pairs of faults that are scored, the most promising of a log that is called faulty;
         default: all.
@@ -149,12 +143,15 @@ def answer_of(
         p_best=_probability(result, best, faulty=faulty),
         unobservable=blind,
         detectable=least,
-        moved=moved(cases, best.keys, best.best),
-        findings=(*findings, *_left(result, cases, named, faulty=faulty)),
+        features=moved(cases, best.keys, best.best),
+        findings=(
+            *(text for case in cases for text in case.findings),
+            *_left(result, cases, named, faulty=faulty),
+        ),
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates),
         alternatives=alternatives(result, cases, candidates, best.keys),
-        units={c.key: c.unit for c in candidates},
+        severity_units={c.key: c.unit for c in candidates},
         p_other=result.other,
     )
 

@@ -7,7 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.answer import SEEN, Alternative, Cause, Explanation, Moved
+from elevon.diagnose.bymodel.answer import (
+    SEEN,
+    Alternative,
+    Cause,
+    Explanation,
+    FaultPlace,
+    Moved,
+    SuspectedFault,
+)
 from elevon.diagnose.bymodel.candidates import CandidateFault
 from elevon.diagnose.bymodel.case import LogCase, joined, shift_of, uncertainty_of
 from elevon.diagnose.bymodel.features import UNITS
@@ -83,7 +91,8 @@ def causes(
         names += [
             n for o in ambiguous for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.ambiguous)
         ]
-        out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), tuple(names)))
+        places = tuple(FaultPlace(*name) for name in names)
+        out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), places))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
 
@@ -134,9 +143,11 @@ def explanations(
         if p < POSSIBLE:
             continue
         ends = [quantiles(g, w, (0.05, 0.5, 0.95)) for g, w in zip(h.grids, h.weights, strict=True)]
-        faults = tuple((known[k].kind, known[k].place, known[k].unit) for k in h.keys)
-        middle, interval = tuple(e[1] for e in ends), tuple((e[0], e[2]) for e in ends)
-        out.append(Explanation(faults, p, middle, interval))
+        faults = (
+            SuspectedFault(known[k].kind, known[k].place, middle, known[k].unit, (low, high))
+            for k, (low, middle, high) in zip(h.keys, ends, strict=True)
+        )
+        out.append(Explanation(tuple(faults), p))
     return tuple(out)
 
 

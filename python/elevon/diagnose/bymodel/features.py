@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,12 +17,14 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.lost_motion import carried, floats, spanned
 
+if TYPE_CHECKING:
+    from elevon.logs.log import Log
+
 __all__ = [
     "OWN_ERROR",
     "SHARES",
     "SIZES",
     "UNITS",
-    "DriveSignals",
     "FeatureVector",
     "features_of",
     "median",
@@ -86,36 +89,6 @@ _BRAKE = 8  # place of the brake torque among the columns that explain the curre
 
 
 @dataclass(frozen=True)
-class DriveSignals:
-    """What a log or a model run shows, shape (n,) each, SI; currents peak, positions as logged.
-
-    Attributes
-    ----------
-    brake, voltage : ndarray or None
-        None where they are not measured.
-    command : ndarray or None
-        Of a model run: what it was given. A log's is not known to the last bit.
-    gain : (float, float) or None
-        Of a log: position gain and deviation [1/s], fitted along with the command's waveform.
-    good : ndarray of bool
-        Samples that may be used.
-    """
-
-    time: Floats
-    output: Floats
-    motor: Floats
-    speed_ref: Floats
-    speed: Floats
-    current_ref: Floats
-    current: Floats
-    voltage: Floats | None
-    brake: Floats | None
-    command: Floats | None
-    gain: tuple[float, float] | None
-    good: Bools
-
-
-@dataclass(frozen=True)
 class FeatureVector:
     """Numbers of one log.
 
@@ -142,7 +115,7 @@ class FeatureVector:
 
 
 def features_of(
-    signals: DriveSignals,
+    signals: Log,
     *,
     ratio: float,
     pole_pairs: float,
@@ -154,8 +127,9 @@ def features_of(
 
     Parameters
     ----------
-    signals : DriveSignals
-        Of a log or a run.
+    signals : Log
+        A log or a model's run of its test. The channel ``command`` is that of a run; a log's is not
+        known to the last bit, it has a `gain` instead.
     ratio : float
         Gear ratio.
     pole_pairs : float
@@ -175,7 +149,7 @@ def features_of(
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
     sideband = (2.0 * pole_pairs + 1.0) * signals.motor if shaft else None
     rows |= _currents(signals, moving, (waves, sideband), width, deviations)
-    if signals.voltage is not None:
+    if signals.has("torque_voltage"):
         rows |= _voltages(signals, moving, (waves, sideband), emf, deviations)
     rows |= _control(signals, width, deviations)
     names = tuple(name for name in UNITS if name in rows)
@@ -260,7 +234,7 @@ def _root(variance: float) -> float:
 
 
 def _positions(
-    signals: DriveSignals, moving: Bools, ratio: float, deviations: bool
+    signals: Log, moving: Bools, ratio: float, deviations: bool
 ) -> tuple[dict[str, tuple[float, float]], bool]:
     """Lost motion and scale, and whether the output flies in its backlash on its own."""
     gap = signals.motor / ratio - signals.output
@@ -282,7 +256,7 @@ _Turns = tuple[Sequence[Floats], Floats | None]
 
 
 def _currents(
-    signals: DriveSignals, moving: Bools, turns: _Turns, width: float, deviations: bool
+    signals: Log, moving: Bools, turns: _Turns, width: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
     half = max(1, round(0.5 * _SMOOTH / width))
     rate = _slope(signals.speed, half) / width
@@ -290,8 +264,9 @@ def _currents(
     level = _mean(signals.current, 8 * half)
     columns = [way, signals.speed, rate, np.ones_like(way)]
     columns += [level * wave for wave in turns[0]]
-    if signals.brake is not None and float(np.ptp(signals.brake[moving])) > 0.0:
-        columns.append(way * signals.brake)
+    brake = signals.brake.at(signals.time)
+    if signals.brake.measured and float(np.ptp(brake[moving])) > 0.0:
+        columns.append(way * brake)
     fit = _fit(columns, signals.current, moving, deviations)
     names = ("dry_current", "viscous_current", "inertia_current")
     rows = {name: _one(fit, k) for k, name in enumerate(names)}
@@ -325,15 +300,15 @@ def _mean(values: Floats, half: int) -> Floats:
 
 
 def _voltages(
-    signals: DriveSignals, moving: Bools, turns: _Turns, emf: float, deviations: bool
+    signals: Log, moving: Bools, turns: _Turns, emf: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
-    assert signals.voltage is not None
-    use = moving & np.isfinite(signals.voltage)
+    voltage = signals["torque_voltage"]
+    use = moving & np.isfinite(voltage)
     if use.sum() < 2 * _LEAST:
         return {}
     columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
     columns += [signals.speed * wave for wave in turns[0]]
-    fit = _fit(columns, signals.voltage, use, deviations)
+    fit = _fit(columns, voltage, use, deviations)
     rows = {
         "voltage_per_speed": _one(fit, 0),
         "voltage_per_current": _one(fit, 1),
@@ -341,25 +316,23 @@ def _voltages(
         "voltage_order_2": _size(fit, 5, emf),
     }
     if turns[1] is not None:
-        residual = signals.voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
+        residual = voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
         sideband = [signals.speed * np.cos(turns[1]), signals.speed * np.sin(turns[1])]
         rows["voltage_sideband"] = _size(_fit(sideband, residual, use, deviations), 0, emf)
     return rows
 
 
-def _control(
-    signals: DriveSignals, width: float, deviations: bool
-) -> dict[str, tuple[float, float]]:
+def _control(signals: Log, width: float, deviations: bool) -> dict[str, tuple[float, float]]:
     error = signals.speed_ref - signals.speed
     size = np.abs(signals.speed_ref)
     inside = signals.good & (size < 0.999 * float(size.max()))
     integral = np.cumsum(error) * width
     columns = [error, integral, np.gradient(error, width), np.ones_like(error)]
-    rows = {"speed_gain": _one(_fit(columns, signals.current_ref, inside, deviations), 0)}
+    rows = {"speed_gain": _one(_fit(columns, signals.current_target, inside, deviations), 0)}
     if signals.gain is not None:
         gain, std = signals.gain
         rows["following_gain"] = (1.0 / gain, std / gain**2)
-    elif signals.command is not None:
-        columns = [signals.speed_ref, signals.command, np.ones_like(error)]
+    elif signals.has("command"):
+        columns = [signals.speed_ref, signals["command"], np.ones_like(error)]
         rows["following_gain"] = _one(_fit(columns, signals.output, inside, deviations), 0, -1.0)
     return rows

@@ -1,10 +1,8 @@
-"""A log as diagnosis by the model sees it: what calibration reads, the voltage, the command."""
+"""A log as diagnosis by the model sees it: checked, with the command that the model is given."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,18 +10,18 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.calibrate.kinematics import command_fit
-from elevon.calibrate.log import BenchLog, bench_log
-from elevon.calibrate.thin import group_means, groups_of
 from elevon.diagnose.bymodel.command import noted_command
 from elevon.diagnose.bymodel.features import regress
 from elevon.diagnose.bymodel.lost_motion import carried
 from elevon.errors import InputError
 from elevon.logs.command.reconstruct import reconstruct
+from elevon.logs.drive import drive_log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
-__all__ = ["TestLog", "prepared", "read_test_logs"]
+__all__ = ["RUN_IN", "prepared"]
 
 RUN_IN = 1.0  # s left out: the start of the motion
 _RATIO = 0.05  # relative: a gear ratio seen in the log this far off is another actuator's
@@ -32,93 +30,25 @@ _LEAST_LEFT = _LEAST_TIME - RUN_IN  # s of it that can be used
 _MOVING = 0.1  # of the highest speed
 
 
-@dataclass(frozen=True)
-class TestLog:
-    """A log and what stands beside it.
-
-    Attributes
-    ----------
-    log : BenchLog
-        Positions, speeds, currents, brake.
-    voltage : ndarray, shape (n,), or None
-        Voltage of the torque axis, as logged [V]; NaN where it is missing.
-    gain : (float, float) or None
-        Position gain and its deviation [1/s], fitted with the command's waveform; None where no
-        waveform explains the command.
-    replay : ndarray, shape (n,)
-        The command the model is given: the waveform, else rebuilt from set point and position.
-    good : ndarray of bool, shape (n,)
-        Samples that may be used.
-    """
-
-    __test__ = False  # not a test, whatever pytest thinks of the name
-
-    log: BenchLog
-    voltage: Floats | None
-    gain: tuple[float, float] | None = None
-    replay: Floats | None = None
-    good: npt.NDArray[np.bool_] | None = None
-
-    @property
-    def name(self) -> str:
-        """File name."""
-        return self.log.name
-
-    @property
-    def braked(self) -> bool:
-        """Whether a brake of known torque acted."""
-        return self.log.brake.measured
-
-    @property
-    def brake_unknown(self) -> bool:
-        """Whether a brake acted whose torque is not known."""
-        return self.log.brake.known in ("force", "on")
-
-
-def read_test_logs(
-    paths: Sequence[str | Path],
-    *,
-    loadcells: Sequence[str | Path | None] = (),
-    commands: Sequence[str | Path | None] = (),
-    column_map: str | Path | None = None,
-) -> list[TestLog]:
-    """Read logs and what stands beside them; errors as `elevon.calibrate.read_logs`."""
-    from elevon.logs.importing import import_log
-
-    out, files = [], [Path(path).name for path in paths]
-    for k, path in enumerate(paths):
-        imported = import_log(
-            path,
-            column_map=column_map,
-            loadcell=loadcells[k] if k < len(loadcells) else None,
-            command=commands[k] if k < len(commands) else None,
-        )
-        log = bench_log(imported)
-        if files.count(log.name) > 1:
-            log = replace(log, name=f"{Path(path).resolve().parent.name}/{log.name}")
-        voltage = None
-        if "voltage_q_ref" in imported.recording:
-            channel = imported.recording["voltage_q_ref"]
-            count = groups_of(np.asarray(channel.time, dtype=np.float64))
-            values = group_means(np.array(channel.values, dtype=np.float64), count)
-            if len(values) == len(log.time) and np.isfinite(values).sum() > len(values) // 2:
-                voltage = values
-        out.append(TestLog(log, voltage))
-    return out
-
-
-def prepared(item: TestLog, actuator: Actuator) -> TestLog:
+def prepared(log: Log, actuator: Actuator) -> Log:
     """Check that a log can be diagnosed, and rebuild its command.
+
+    Returns
+    -------
+    Log
+        With the channel ``command``, which the model is given: the waveform, else rebuilt from set
+        point and position; with the position gain where a waveform explains it; samples of the
+        run-in do not count.
 
     Raises
     ------
     InputError
         Too short, no motion, motion one way only, no position, or of another actuator.
     """
-    log = item.log
-    if item.good is not None:
-        return item
-    if log.output is None or log.motor is None:
+    if prepared in log.memory:
+        return log
+    log = drive_log(log)
+    if not log.has("output_position", "motor_position"):
         raise InputError(f"{log.name}: diagnosis by the model needs both positions (r4820, r4821)")
     if log.duration < _LEAST_TIME:
         raise InputError(f"{log.name}: lasts {log.duration:.3g} s; {_LEAST_TIME:g} s are needed")
@@ -130,6 +60,14 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
             f"missing or run-in; {_LEAST_LEFT:g} s are needed"
         )
     _check_motion(log, good, actuator)
+    wave, gain = _command(log, actuator)
+    ready = replace(log.with_channels(command=wave), gain=gain, good=good)
+    ready.memory[prepared] = True
+    return ready
+
+
+def _command(log: Log, actuator: Actuator) -> tuple[Floats, tuple[float, float] | None]:
+    """What the model is given, and the position gain with its deviation if a waveform shows it."""
     value = actuator.parameters.value
     gain, limit = value("control.position_gain"), value("control.speed_limit")
     trace = reconstruct(log.time, log.speed_ref, log.output, gain=gain, limit=limit)
@@ -139,16 +77,16 @@ def prepared(item: TestLog, actuator: Actuator) -> TestLog:
     noted = noted_command(log, limit)
     if noted is not None:
         wave = _joined(log, trace.valid, rebuilt, noted.wave, noted.window)
-        return TestLog(log, item.voltage, (noted.gain, noted.gain_std), wave, good)
+        return wave, (noted.gain, noted.gain_std)
     fit = command_fit(log, gain, limit)
     if fit is None:
-        return TestLog(log, item.voltage, None, rebuilt, good)
+        return rebuilt, None
     wave = _joined(log, trace.valid, rebuilt, fit.values, fit.waveform.window)
-    return TestLog(log, item.voltage, (fit.gain, fit.gain_std), wave, good)
+    return wave, (fit.gain, fit.gain_std)
 
 
 def _joined(
-    log: BenchLog,
+    log: Log,
     valid: npt.NDArray[np.bool_],
     rebuilt: Floats,
     wave: Floats,
@@ -159,9 +97,7 @@ def _joined(
     return np.where(inside | (~valid & (log.time <= window[1])), wave, rebuilt)
 
 
-def _check_motion(log: BenchLog, good: npt.NDArray[np.bool_], actuator: Actuator) -> None:
-    assert log.motor is not None
-    assert log.output is not None
+def _check_motion(log: Log, good: npt.NDArray[np.bool_], actuator: Actuator) -> None:
     top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
     count = actuator.parameters.value("gear.ratio") * 1e-3
     if top < 1.0 or float(np.ptp(log.motor[good])) < count:

@@ -55,6 +55,10 @@ _NOT_MODELLED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("offset", ("sensor.encoder",), "no test looks at absolute positions"),
     ("offset", ("sensor.resolver",), _ANGLE),
     ("mismatch", ("sensor.resolver",), _ANGLE),
+    ("quadrature", ("sensor.resolver",), _ANGLE),
+    ("channel_offset", ("sensor.resolver.sine", "sensor.resolver.cosine"), _ANGLE),
+    ("interpolation", ("sensor.encoder.first", "sensor.encoder.second"), "within one period of the "
+     "encoder's pulses, below what the position's features resolve: not seen"),
     ("resolver_short", ("sensor.resolver.sine", "sensor.resolver.cosine",
                        "sensor.resolver.excitation"), _ANGLE),
     ("resolver_open", ("sensor.resolver.sine", "sensor.resolver.cosine",

@@ -44,7 +44,8 @@ def diagnosis_page(
         _alternatives(report, result)
     limits = report.section("What these logs can tell")
     seen = [
-        (key, severity_text(value, result.units[key])) for key, value in result.detectable.items()
+        (key, severity_text(value, result.severity_units[key]))
+        for key, value in result.detectable.items()
     ]
     blind = by_reason(result.unobservable)
     limits.table(
@@ -85,7 +86,7 @@ def _causes(report: Report, result: Diagnosis) -> None:
 
 def _by_network(result: Diagnosis) -> bool:
     """Whether nothing is known of what a cause accounts for: the surrogate has no model."""
-    return all(math.isnan(m.explained) for m in result.moved)
+    return all(math.isnan(m.explained) for m in result.features)
 
 
 def _alternatives(report: Report, result: Diagnosis) -> None:
@@ -123,7 +124,7 @@ def _signals(report: Report, traces: Sequence[Traces]) -> None:
 
 
 def _features(report: Report, result: Diagnosis) -> None:
-    ranked = sorted(result.moved, key=lambda item: -abs(item.score))
+    ranked = sorted(result.features, key=lambda item: -abs(item.score))
     rows: list[tuple[object, ...]] = [
         (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
         for m in ranked
@@ -145,7 +146,7 @@ def _features(report: Report, result: Diagnosis) -> None:
         text += " Explained: what the most probable cause accounts for, in the same measure."
     section = report.section("Features")
     section.figure(
-        features_figure(result.moved),
+        features_figure(result.features),
         "How far the features of the logs deviate from a healthy unit: bars, in its deviations "
         "from run to run; diamonds, what the most probable cause accounts for.",
     )

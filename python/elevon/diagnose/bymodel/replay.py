@@ -5,26 +5,29 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import CandidateFault
-from elevon.diagnose.bymodel.features import SIZES, DriveSignals, FeatureVector, features_of
-from elevon.diagnose.bymodel.log import TestLog
+from elevon.diagnose.bymodel.candidates import CandidateFault, of_a_magnet
+from elevon.diagnose.bymodel.features import SIZES, FeatureVector, features_of
+from elevon.experiment import Experiment, Inputs, Variant
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
 __all__ = [
-    "SPREAD", "Replay", "ReplayUnit", "logged_features", "modelled", "replay", "runs", "signals_of",
+    "SPREAD", "Replay", "ReplayUnit", "logged_features", "modelled", "replay", "runs",
 ]  # fmt: skip
 
-_SIGNALS = (
-    "encoder_position,motor_position,speed_ref,motor_speed,current_ref,current_q_meas,voltage_q_ref"
-)
+_SIGNALS: Mapping[str, str] = {
+    "output_position": "encoder_position", "motor_position": "motor_position",
+    "speed_ref": "speed_ref", "motor_speed": "motor_speed", "current_ref": "current_ref",
+    "torque_current": "current_q_meas", "torque_voltage": "voltage_q_ref",
+}  # fmt: skip
 _RATE = 400.0  # Hz of the model's signals
 _DRAWS = 40
 _POINTS = 6  # severities of each candidate
@@ -93,29 +96,16 @@ def _read(at: Floats, table: Floats, severity: Floats) -> Floats:
     return np.asarray(np.column_stack(columns), dtype=np.float64)
 
 
-def logged_features(item: TestLog, actuator: Actuator) -> FeatureVector:
+def logged_features(log: Log, actuator: Actuator) -> FeatureVector:
     """Return the features of a log."""
-    return features_of(signals_of(item), **_constants(actuator))
-
-
-def signals_of(item: TestLog) -> DriveSignals:
-    """Return what a prepared log shows."""
-    log = item.log
-    assert log.output is not None
-    assert log.motor is not None
-    assert item.good is not None
-    brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    return DriveSignals(
-        log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target,
-        log.current, item.voltage, brake, None, item.gain, item.good,
-    )  # fmt: skip
+    return features_of(log.without("command"), **_constants(actuator))
 
 
 def replay(
-    item: TestLog,
+    item: Log,
     actuator: Actuator,
     candidates: Sequence[CandidateFault],
-    baselines: Sequence[TestLog] = (),
+    baselines: Sequence[Log] = (),
 ) -> Replay:
     """Run the test on the model: healthy, each candidate at several severities, and the spread.
 
@@ -125,13 +115,13 @@ def replay(
 
     Parameters
     ----------
-    item : TestLog
+    item : Log
         Prepared.
     actuator : Actuator
         The healthy unit.
     candidates : sequence of CandidateFault
         Faults.
-    baselines : sequence of TestLog
+    baselines : sequence of Log
         Prepared; whose runs may serve.
     """
     alike = next((b for b in baselines if candidates and _same_runs(item, b)), item)
@@ -139,7 +129,7 @@ def replay(
     return made if alike is item else _about(made, modelled(item, actuator))
 
 
-def modelled(item: TestLog, actuator: Actuator) -> FeatureVector:
+def modelled(item: Log, actuator: Actuator) -> FeatureVector:
     """Return the features of the healthy model in a log's test."""
     return _remembered(item, actuator, ()).healthy
 
@@ -162,7 +152,8 @@ _REMEMBERED = 32  # logs
 _RECENT: dict[Any, Replay] = {}  # by all that the runs depend on; the latest is the last
 
 
-def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
+def _remembered(item: Log, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
+    actuator = of_a_magnet(actuator)
     key = (actuator.hash, tuple(candidates), _digest(item))
     made = _RECENT.pop(key, None) or _replayed(item, actuator, candidates)
     _RECENT[key] = made
@@ -171,49 +162,46 @@ def _remembered(item: TestLog, actuator: Actuator, candidates: Sequence[Candidat
     return made
 
 
-def _digest(item: TestLog) -> bytes:
+def _digest(log: Log) -> bytes:
     """Of all in a log that its model runs depend on."""
-    log = item.log
-    assert log.output is not None
-    assert item.replay is not None
-    assert item.good is not None
-    state = (item.braked, log.duration, log.output[0], log.speed[0], item.voltage is None)
-    out = hashlib.sha256(f"{state!r} {log.current_signal}".encode())
-    brake = (log.brake.time, log.brake.level) if item.braked else ()
-    for array in (log.time, item.replay, item.good, *brake):
+    braked, current = log.brake.measured, log.has("torque_current")
+    state = (braked, log.duration, log.output[0], log.speed[0], log.has("torque_voltage"), current)
+    out = hashlib.sha256(f"{state!r}".encode())
+    brake = (log.brake.time, log.brake.level) if braked else ()
+    for array in (log.time, log["command"], log.good, *brake):
         out.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
     return out.digest()
 
 
-def _same_runs(a: TestLog, b: TestLog) -> bool:
+def _same_runs(a: Log, b: Log) -> bool:
     """Whether faults do the same in two logs: one test by the notes, as much of it measured."""
-    if a.log.note is None or b.log.note is None or a.log.note.waveform is None:
+    if a.note is None or b.note is None or a.note.waveform is None:
         return False
-    if a.log.note.waveform != b.log.note.waveform or a.good is None or b.good is None:
+    shows = ("torque_current", "torque_voltage")
+    alike = [[log.brake.measured, *map(log.has, shows)] for log in (a, b)]
+    noted = (a.note.parameters, b.note.parameters)
+    if a.note.waveform != b.note.waveform or noted[0].keys() != noted[1].keys():
         return False
-    noted = (a.log.note.parameters, b.log.note.parameters)
-    alike = [noted[0].keys() == noted[1].keys(), a.braked == b.braked]
-    alike += [a.log.current_signal == b.log.current_signal]
-    alike += [(a.voltage is None) == (b.voltage is None)]
-    pairs = [(a.log.duration, b.log.duration, 0.02), (a.log.period, b.log.period, 0.01)]
+    pairs = [(a.duration, b.duration, 0.02), (a.period, b.period, 0.01)]
     pairs += [(float(a.good.mean()), float(b.good.mean()), 0.05)]
-    if all(alike):
-        pairs += [(noted[0][n], noted[1][n], 0.005) for n in noted[0]]
-        if a.braked:
-            levels = (float(np.mean(a.log.brake.level)), float(np.mean(b.log.brake.level)))
-            pairs += [(*levels, 0.1)]
-    return all(alike) and all(abs(x - y) <= e * max(abs(x), abs(y)) for x, y, e in pairs)
+    pairs += [(noted[0][n], noted[1][n], 0.005) for n in noted[0]]
+    if a.brake.measured and b.brake.measured:
+        pairs.append((float(np.mean(a.brake.level)), float(np.mean(b.brake.level)), 0.1))
+    near = all(abs(x - y) <= e * max(abs(x), abs(y)) for x, y, e in pairs)
+    return near and alike[0] == alike[1]
 
 
-def _replayed(item: TestLog, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
+def _replayed(item: Log, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
     severities = {c.key: _severities(c) for c in candidates}
-    units = [ReplayUnit(actuator)]
+    units = [ReplayUnit()]
     for c in candidates:
-        units += [ReplayUnit(actuator, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
+        units += [ReplayUnit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
     if candidates:
         units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
     constants = _constants(actuator)
-    features = [features_of(run, **constants, deviations=False) for run in runs(item, units)]
+    features = [
+        features_of(run, **constants, deviations=False) for run in runs(item, actuator, units)
+    ]
     names = tuple(n for n in features[0].names if all(n in s.names for s in features))
     rows = np.array([s.only(names).values for s in features])
     shifts, uncertainties, at = {}, {}, 1
@@ -270,74 +258,50 @@ def _severities(candidate: CandidateFault) -> Floats:
 class ReplayUnit:
     """A unit of the replay: values, faults, brake over the logged one, where its motor starts."""
 
-    actuator: Actuator
+    values: Mapping[str, float] = field(default_factory=dict)
     faults: tuple[str, ...] = ()
     brake: float = 1.0
     turn: float = 0.0
 
 
-def runs(item: TestLog, units: Sequence[ReplayUnit]) -> Iterator[DriveSignals]:
-    """Run all units through the log's test, on the log's instants.
-
-    Names and units are the scenario's; the arrays are exchanged in what goes to the core, since
-    checking a long table a hundred times would take longer than the runs.
-    """
-    from elevon.faults import Fault
-    from elevon.scenario import Scenario
-    from elevon.simulate import Run
-    from elevon.simulate.batch import simulate_prepared
-    from elevon.simulate.prepare import prepare
-
-    start = {"motor_position": 0.0, "motor_speed": 0.0, "output_position": 0.0}
-    empty = Scenario.from_dict(
-        {
-            "duration": item.log.duration,
-            "command": {"mode": "position", "terms": [_EMPTY]},
-            "load": {"brake": {"terms": [_EMPTY]}},
-            "initial": start,
-        }
+def runs(log: Log, actuator: Actuator, units: Sequence[ReplayUnit]) -> Iterator[Log]:
+    """Run all units through the log's test; what each would have shown in its place."""
+    output, motor = (
+        float(log.output[0]),
+        float(log.output[0]) * actuator.parameters.value("gear.ratio"),
     )
-    ready = []
-    for unit in units:
-        scenario = empty.with_faults([Fault.parse(text) for text in unit.faults])
-        run = prepare(Run(unit.actuator, scenario), "low", f"{_SIGNALS}@{_RATE:g} Hz")
-        ready.append(replace(run, core=_with_arrays(run.core, item, unit)))
-    plan = ready[0].plan[0]
-    for result in simulate_prepared(ready, fidelity="low"):
-        rows = result["clocks"][plan.name]
-        yield _signals_on_log(
-            rows["time"], dict(zip(plan.signals, rows["values"].T, strict=False)), item
+    brake = log.brake
+    inputs = Inputs(
+        duration=log.duration,
+        mode="position",
+        command=(log.time, log["command"]),
+        loads={"brake": (brake.time, brake.level)} if brake.measured else {},
+        initial={
+            "motor_position": motor, "motor_speed": float(log.speed[0]), "output_position": output,
+        },
+    )  # fmt: skip
+    experiment = Experiment(log, actuator, inputs, _shows(log), rate=f"{_RATE:g} Hz")
+    variants = [
+        Variant(
+            unit.values,
+            unit.faults,
+            {"brake": (brake.time, unit.brake * brake.level)} if brake.measured else {},
+            {"motor_position": motor + unit.turn},
         )
+        for unit in units
+    ]
+    for run in experiment.run(variants):
+        yield run.seen(log).with_channels(command=log["command"])
 
 
-def _with_arrays(core: Mapping[str, Any], item: TestLog, unit: ReplayUnit) -> dict[str, Any]:
-    log = item.log
-    assert log.output is not None
-    assert item.replay is not None
-    inputs = dict(core["inputs"])
-    inputs["command"] = [_table(inputs["command"][0], log.time, item.replay)]
-    if item.braked:
-        level = unit.brake * log.brake.level
-        inputs["brake"] = [_table(inputs["brake"][0], log.brake.time, level)]
-    output = float(log.output[0])
-    initial = {
-        "motor_position": output * unit.actuator.parameters.value("gear.ratio") + unit.turn,
-        "motor_speed": float(log.speed[0]),
-        "output_position": output,
-    }
-    return {**core, "inputs": inputs, "initial": {**core["initial"], **initial}}
-
-
-_EMPTY: Mapping[str, Any] = {"kind": "table", "times": [0.0, 1.0], "values": [0.0, 0.0]}
-
-
-def _table(term: Mapping[str, Any], times: Floats, values: Floats) -> dict[str, Any]:
-    return {**term, "times": np.ascontiguousarray(times), "values": np.ascontiguousarray(values)}
+def _shows(log: Log) -> dict[str, str]:
+    """What a log shows, and its current's set point: role to the model's signal."""
+    return {role: name for role, name in _SIGNALS.items() if log.has(role) or role == "current_ref"}
 
 
 def _drawn(actuator: Actuator, rng: np.random.Generator) -> ReplayUnit:
     """Return a healthy unit of another day; `turn` moves its motor: no log tells the zero."""
-    values: dict[str, float | str] = {}
+    values: dict[str, float] = {}
     faults, brake = [], 1.0
     for path, (spread, way) in SPREAD.items():
         step = spread * float(rng.standard_normal())
@@ -357,18 +321,4 @@ def _drawn(actuator: Actuator, rng: np.random.Generator) -> ReplayUnit:
         0.45 * value("backlash.total") * value("gear.ratio"), math.pi / value("motor.pole_pairs")
     )
     turn = float(rng.uniform(-most, most))
-    unit = actuator.with_values(values, source="run-to-run spread")
-    return ReplayUnit(unit, tuple(faults), brake, turn)
-
-
-def _signals_on_log(clock: Floats, values: Mapping[str, Floats], item: TestLog) -> DriveSignals:
-    log = item.log
-    assert item.good is not None
-    seen = {name: np.interp(log.time, clock, values[name]) for name in _SIGNALS.split(",")}
-    brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    voltage = None if item.voltage is None else seen["voltage_q_ref"]
-    return DriveSignals(
-        log.time, seen["encoder_position"], seen["motor_position"], seen["speed_ref"],
-        seen["motor_speed"], seen["current_ref"], seen[log.current_signal], voltage, brake,
-        item.replay, None, item.good,
-    )  # fmt: skip
+    return ReplayUnit(values, tuple(faults), brake, turn)

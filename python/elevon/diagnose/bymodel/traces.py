@@ -8,24 +8,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.features import DriveSignals
-from elevon.diagnose.bymodel.log import TestLog, prepared
-from elevon.diagnose.bymodel.replay import ReplayUnit, runs, signals_of
+from elevon.diagnose.bymodel.candidates import of_a_magnet
+from elevon.diagnose.bymodel.log import prepared
+from elevon.diagnose.bymodel.replay import ReplayUnit, runs
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.logs.log import Log
 
 __all__ = ["traces_of"]
 
 
-def traces_of(logs: Sequence[TestLog], actuator: Actuator, result: Diagnosis) -> list[Traces]:
+def traces_of(logs: Sequence[Log], actuator: Actuator, result: Diagnosis) -> list[Traces]:
     """Return each log's signals beside the healthy model's and those with what is named.
 
     Parameters
     ----------
-    logs : sequence of TestLog
+    logs : sequence of Log
         Those that were diagnosed.
     actuator : Actuator
         The healthy unit.
@@ -33,12 +34,13 @@ def traces_of(logs: Sequence[TestLog], actuator: Actuator, result: Diagnosis) ->
         The answer.
     """
     texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
-    units = [ReplayUnit(actuator)] + ([ReplayUnit(actuator, texts)] if texts else [])
+    actuator = of_a_magnet(actuator)
+    units = [ReplayUnit()] + ([ReplayUnit({}, texts)] if texts else [])
     return [_traces(prepared(log, actuator), actuator, units) for log in logs]
 
 
-def _traces(item: TestLog, actuator: Actuator, units: Sequence[ReplayUnit]) -> Traces:
-    sources = [signals_of(item), *runs(item, units)]
+def _traces(item: Log, actuator: Actuator, units: Sequence[ReplayUnit]) -> Traces:
+    sources = [item, *runs(item, actuator, units)]
     ratio = actuator.parameters.value("gear.ratio")
     good = sources[0].good
     panels = []
@@ -51,10 +53,10 @@ def _traces(item: TestLog, actuator: Actuator, units: Sequence[ReplayUnit]) -> T
         panels.append(
             SignalPanel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None)
         )
-    return Traces(item.name, item.log.time[good], panels)
+    return Traces(item.name, item.time[good], panels)
 
 
-def _gap(signals: DriveSignals, ratio: float) -> Floats:
+def _gap(signals: Log, ratio: float) -> Floats:
     """Motor less output [deg] about the middle of its ends: where the zeros are does not matter."""
     gap = np.degrees(signals.motor / ratio - signals.output)
     low, high = np.percentile(gap[signals.good], [1.0, 99.0])

@@ -55,6 +55,12 @@ def by_reason(items: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
 
 def sentence(result: Diagnosis) -> str:
     """Return the answer in one sentence or two."""
+    if result.status == "model_does_not_fit" and result.reason is not None:
+        return (
+            "The model does not show what the healthy unit shows: "
+            f"{_spoken(result.reason.feature)} is {result.reason.value:.3g}, at most "
+            f"{result.reason.limit:.3g} would do. Nothing is diagnosed."
+        )
     left = any(UNEXPLAINED in text for text in result.findings)
     if result.status == "healthy" and left:
         return (
@@ -68,7 +74,7 @@ def sentence(result: Diagnosis) -> str:
             f"{100 * result.false_alarm:g} %); a fault has a probability of {result.p_fault:.2g}."
         )
     if not result.best:
-        worst = max(result.moved, key=lambda m: abs(m.score))
+        worst = max(result.features, key=lambda m: abs(m.score))
         return (
             f"Something is wrong that none of the candidates explains (probability "
             f"{result.p_best:.3g}); furthest from the healthy unit is {_spoken(worst.name)}, by "

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.diagnose.bymodel.answer import FaultPlace
 from elevon.diagnose.bymodel.case import LogCase, joined, shift_of
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def with_ambiguous(
         ]
         known = {(cause.kind, cause.place), *cause.ambiguous_with}
         more = [
-            (other.kind, place)
+            FaultPlace(other.kind, place)
             for other in others
             for place in (other.place, *other.same)
             if (other.kind, place) not in known

@@ -18,9 +18,9 @@ from elevon.diagnose.byroles.ambiguous import with_ambiguous
 from elevon.diagnose.byroles.candidates import candidates_of, not_modelled_of
 from elevon.diagnose.byroles.channels import driven, numbers_of_log
 from elevon.diagnose.byroles.healthy import healthy_of
-from elevon.diagnose.byroles.log import RoleLog, role_log
+from elevon.diagnose.byroles.log import role_log
 from elevon.diagnose.byroles.noise import noise_of
-from elevon.diagnose.byroles.role_test import same_test
+from elevon.diagnose.byroles.role_test import RoleTest, same_test
 from elevon.diagnose.byroles.runs import RoleReplay, replay_by_roles
 from elevon.errors import InputError
 from elevon.threads import one_blas_thread
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel.answer import Diagnosis
     from elevon.diagnose.bymodel.candidates import CandidateFault
-    from elevon.recording import Recording
+    from elevon.logs.log import Log
 
 __all__ = ["RoleCase", "diagnose_by_roles"]
 
@@ -60,10 +60,10 @@ class RoleCase(LogCase):
 
 @one_blas_thread()
 def diagnose_by_roles(
-    logs: Sequence[tuple[str, Recording]],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
-    baselines: Sequence[tuple[str, Recording]] = (),
+    baselines: Sequence[Log] = (),
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
 ) -> Diagnosis:
@@ -71,8 +71,8 @@ def diagnose_by_roles(
 
     Parameters
     ----------
-    logs, baselines : sequence of (str, Recording)
-        Name and recording with roles: of one unit in one condition, and of the healthy unit.
+    logs, baselines : sequence of Log
+        Of one unit in one condition, and of the healthy unit.
     actuator : Actuator
         The healthy unit.
     faults : sequence of str, optional
@@ -92,28 +92,23 @@ def diagnose_by_roles(
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
     candidates = candidates_of(actuator, faults)
-    findings: list[str] = []
-    healthy = [role_log(recording, name, actuator) for name, recording in baselines]
-    cases = [
-        _case(role_log(recording, name, actuator), actuator, candidates, healthy, findings)
-        for name, recording in logs
-    ]
-    result = answer_of(cases, candidates, false_alarm, findings, most=PAIRS)
+    healthy = [role_log(log, actuator) for log in baselines]
+    cases = [_case(role_log(log, actuator), actuator, candidates, healthy) for log in logs]
+    result = answer_of(cases, candidates, false_alarm, most=PAIRS)
     result = with_ambiguous(result, cases, candidates)
     blind = (*result.unobservable, *(not_modelled_of(actuator) if not faults else ()))
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 
 
 def _case(
-    item: RoleLog,
+    item: RoleTest,
     actuator: Actuator,
     candidates: Sequence[CandidateFault],
-    baselines: Sequence[RoleLog],
-    findings: list[str],
+    baselines: Sequence[RoleTest],
 ) -> RoleCase:
     """Hold a log against its baselines, each read as far as the shortest of them goes."""
-    same = [b for b in baselines if same_test(item.test, b.test)]
-    seconds = min(log.test.seconds for log in (item, *same))
+    same = [b for b in baselines if same_test(item, b)]
+    seconds = min(log.seconds for log in (item, *same))
     item, *same = [log.within(seconds) for log in (item, *same)]
     model = replay_by_roles(same[0] if same else item, actuator, candidates)
     features = _features(item, actuator)
@@ -123,7 +118,7 @@ def _case(
         for name in model.healthy.names
         if name in features.names and all(name in e.names for _, e in references)
     ]
-    findings += item.findings
+    findings = list(item.findings)
     if driven(item, actuator):
         findings.append(
             f"{item.name}: the load drives the output part of the time and holds it at one end of "
@@ -137,13 +132,14 @@ def _case(
             "at least: how far a healthy unit deviates from the model is assumed, small faults are "
             "not seen"
         )
-    sound = _sound(model, names, references, findings)
-    return RoleCase(item.name, features.only(names), healthy_of(model, names, sound), model)
+    sound, left_out = _sound(model, names, references)
+    unit = healthy_of(model, names, sound)
+    return RoleCase(item.name, features.only(names), unit, model, (*findings, *left_out))
 
 
-def _features(item: RoleLog, actuator: Actuator) -> FeatureVector:
+def _features(item: RoleTest, actuator: Actuator) -> FeatureVector:
     """Numbers of a log, and their deviation by its noise."""
-    features = numbers_of_log(item, actuator, item.channels).values
+    features = numbers_of_log(item, actuator, item.seen).values
     std = noise_of(item, actuator, features)
     return FeatureVector(tuple(features), np.array(list(features.values())), std)
 
@@ -152,10 +148,10 @@ def _sound(
     model: RoleReplay,
     names: Sequence[str],
     references: Sequence[tuple[str, FeatureVector]],
-    findings: list[str],
-) -> list[FeatureVector]:
-    """Leave out baselines that deviate from the model and from the other baselines alike."""
-    sound = []
+) -> tuple[list[FeatureVector], list[str]]:
+    """Leave out baselines that deviate from the model and from the other baselines, and say so."""
+    sound: list[FeatureVector] = []
+    findings: list[str] = []
     for k, (name, features) in enumerate(references):
         others = [e for j, (_, e) in enumerate(references) if j != k]
         chance = _chance(model, names, features, [])
@@ -169,7 +165,7 @@ def _sound(
             f"unit (a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
             "it is left out"
         )
-    return sound
+    return sound, findings
 
 
 def _chance(

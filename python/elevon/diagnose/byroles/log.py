@@ -3,138 +3,81 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.byroles.role_test import RoleTest, action_numbers, test_of
+from elevon.diagnose.byroles.role_test import (
+    BEFORE,
+    INPUTS,
+    RoleTest,
+    action_numbers,
+    test_of,
+)
 from elevon.errors import InputError
+from elevon.logs.log import Log, bridged, on_clock
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.recording import Recording
 
-__all__ = ["RoleLog", "role_log"]
+__all__ = ["role_log"]
 
-#: What is put in, not measured.
-_INPUTS = frozenset(["command", "load"])
 _LEAST = 200  # samples
 _MISSING = 0.2  # share of samples above which a channel is left out
 _FASTEST = 1000.0  # Hz; faster logs are averaged down: the reduced-order model shows no more
 _LONGEST = 60.0  # s after the onset that are read
-BEFORE = 0.1  # s before the onset that are read
 _LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
 _QUIET = 1e-3  # of the command's range: below it nothing is commanded
 
 
-@dataclass(frozen=True)
-class RoleLog:
-    """A log on one even clock, counted from its onset.
-
-    Attributes
-    ----------
-    name : str
-        Of the log.
-    time : ndarray, shape (n,)
-        s from the onset; the first is ``-BEFORE``.
-    command : ndarray, shape (n,)
-        What was commanded.
-    channels : mapping of str to ndarray, shape (n,)
-        Role to values, SI; gaps bridged.
-    units : mapping of str to str
-        Role to unit.
-    rate : float
-        Hz.
-    test : RoleTest
-        What was commanded and what loaded it, for the model.
-    findings : tuple of str
-        What the caller should know.
-    """
-
-    name: str
-    time: Floats
-    command: Floats
-    channels: Mapping[str, Floats]
-    units: Mapping[str, str]
-    rate: float
-    test: RoleTest
-    findings: tuple[str, ...] = ()
-
-    def within(self, seconds: float) -> RoleLog:
-        """Return the log up to some seconds after its onset."""
-        count = int(np.searchsorted(self.time, seconds * (1.0 + 1e-9)))
-        return replace(
-            self,
-            time=self.time[:count],
-            command=self.command[:count],
-            channels={role: values[:count] for role, values in self.channels.items()},
-            test=self.test.within(seconds),
-        )
-
-
-def role_log(recording: Recording, name: str, actuator: Actuator) -> RoleLog:
-    """Read a recording by its roles.
+def role_log(log: Log, actuator: Actuator) -> RoleTest:
+    """Read a log by its roles, on one even clock counted from its onset.
 
     Raises
     ------
     InputError
         No command, nothing commanded, nothing recorded, too short, or nothing moves.
     """
-    time, channels, units, lost = _channels(recording, name)
-    command = channels["command"]
+    log, lost = _complete(log)
+    time, name = log.time, log.name
     actions = action_numbers(actuator.wiring)
-    first = _onset(time, command, sequence=bool(actions), name=name)
+    first = _onset(time, log["command"], sequence=bool(actions), name=name)
     rate = 1.0 / float(np.median(np.diff(time)))
     seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
     clock = np.arange(-round(BEFORE * rate), round(seconds * rate) + 1) / rate
     at = np.clip(clock + first, time[0], time[-1])
-    used = {r: _on(at, time, v, sample_hold=units[r] == "1") for r, v in channels.items()}
-    _check_motion(used, name)
-    test = test_of(recording, actuator, clock, used, seconds)
-    seen = {r: v for r, v in used.items() if r not in _INPUTS or (r == "load" and test.own_load)}
+    channels = {r: on_clock(time, v, at, log.units[r]) for r, v in log.channels.items()}
+    _check_motion(channels, name)
     findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
     if time[-1] - first > _LONGEST * (1.0 + _LADDER):
         findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
-    return RoleLog(name, clock, used["command"], seen, units, rate, test, tuple(findings))
+    ready = replace(
+        log, time=clock, channels=channels, good=np.ones(len(clock), dtype=np.bool_),
+        recording=None,
+    )  # fmt: skip
+    return test_of(log, ready, actuator, rate=rate, seconds=seconds, findings=findings)
 
 
-def _channels(
-    recording: Recording, name: str
-) -> tuple[Floats, dict[str, Floats], dict[str, str], list[str]]:
-    """Every role on the command's clock; those with too many gaps are named."""
-    roles = recording.roles
-    if "command" not in roles:
+def _complete(log: Log) -> tuple[Log, list[str]]:
+    """The log on its command's clock, gaps bridged; roles with too many gaps are named."""
+    if not log.has("command"):
         raise InputError(
-            f"{name}: no channel has the role 'command': the test cannot be run on the model; "
-            f"roles: {', '.join(roles) or 'none'}"
+            f"{log.name}: no channel has the role 'command': the test cannot be run on the model; "
+            f"roles: {', '.join(log) or 'none'}"
         )
-    time = np.asarray(recording.role("command").clock.time, dtype=np.float64)
-    if len(time) < _LEAST:
-        raise InputError(f"{name}: {len(time)} samples; {_LEAST} are needed")
-    channels, units, lost = {}, {}, []
-    for role in roles:
-        channel = recording.role(role)
-        values = np.array(channel.values, dtype=np.float64)
-        good = np.isfinite(values)
-        if good.mean() < 1.0 - _MISSING:
-            lost.append(role)
-            continue
-        at = np.asarray(channel.time, dtype=np.float64)[good]
-        channels[role] = _on(time, at, values[good], sample_hold=channel.unit == "1")
-        units[role] = channel.unit
+    log = log.on("command")
+    if len(log.time) < _LEAST:
+        raise InputError(f"{log.name}: {len(log.time)} samples; {_LEAST} are needed")
+    lost = [r for r, v in log.channels.items() if np.isfinite(v).mean() < 1.0 - _MISSING]
     if "command" in lost:
-        raise InputError(f"{name}: too many samples of the command are missing")
-    return *_slower(time, channels, units), units, lost
-
-
-def _on(time: Floats, at: Floats, values: Floats, *, sample_hold: bool) -> Floats:
-    if len(at) == len(time) and at[0] == time[0] and at[-1] == time[-1]:
-        return values
-    if sample_hold:
-        return np.asarray(values[(np.searchsorted(at, time + 1e-9, side="right") - 1).clip(0)])
-    return np.asarray(np.interp(time, at, values), dtype=np.float64)
+        raise InputError(f"{log.name}: too many samples of the command are missing")
+    channels = {
+        r: bridged(log.time, v, log.units[r]) for r, v in log.channels.items() if r not in lost
+    }
+    time, channels = _slower(log.time, channels, log.units)
+    return replace(log, time=time, channels=channels, good=np.ones(len(time), dtype=bool)), lost
 
 
 def _slower(
@@ -199,7 +142,7 @@ def _length(total: float, after: float) -> float:
     return min(float(np.floor(after / step + 1e-6)) * step, _LONGEST) or after
 
 
-def _check_motion(used: Mapping[str, Any], name: str) -> None:
-    seen = [values for role, values in used.items() if role not in _INPUTS]
+def _check_motion(used: Mapping[str, Floats], name: str) -> None:
+    seen = [values for role, values in used.items() if role not in INPUTS]
     if not any(np.ptp(values) > 0.0 for values in seen):
         raise InputError(f"{name}: nothing moves")

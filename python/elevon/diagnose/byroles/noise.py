@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.byroles.channels import numbers_of_log
-from elevon.diagnose.byroles.log import RoleLog
+from elevon.diagnose.byroles.role_test import RoleTest
 from elevon.diagnose.byroles.series import noise_deviation
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ __all__ = ["noise_of"]
 _AGAIN = 8  # logs with noise added
 
 
-def noise_of(item: RoleLog, actuator: Actuator, numbers: Mapping[str, float]) -> Floats:
+def noise_of(item: RoleTest, actuator: Actuator, numbers: Mapping[str, float]) -> Floats:
     """Return each number's deviation by the noise of the log's channels, shape (k,).
 
     What of a channel changes from sample to sample counts as its noise; ripple faster than the
@@ -28,8 +28,8 @@ def noise_of(item: RoleLog, actuator: Actuator, numbers: Mapping[str, float]) ->
     """
     sizes = {
         role: noise_deviation(values)
-        for role, values in item.channels.items()
-        if item.units[role] != "1" and len(values) > 3
+        for role, values in item.seen.items()
+        if item.log.units[role] != "1" and len(values) > 3
     }
     rng = np.random.default_rng(15)
     rows = []
@@ -38,7 +38,7 @@ def noise_of(item: RoleLog, actuator: Actuator, numbers: Mapping[str, float]) ->
             role: values + sizes.get(role, 0.0) * rng.standard_normal(len(values))
             if role in sizes
             else values
-            for role, values in item.channels.items()
+            for role, values in item.seen.items()
         }
         noisy = numbers_of_log(item, actuator, channels).values
         rows.append([noisy.get(name, value) for name, value in numbers.items()])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,22 +15,29 @@ from elevon.diagnose.byroles.series import lines
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.recording import Recording
+    from elevon.logs.log import Log
 
-__all__ = ["RoleTest", "action_numbers", "same_test", "test_of"]
+__all__ = ["BEFORE", "INPUTS", "RoleTest", "action_numbers", "same_test", "test_of"]
 
+#: What is put in, not measured.
+INPUTS = frozenset(["command", "load"])
+BEFORE = 0.1  # s before the onset that are read
 _EXACT = 2e-4  # of the command's range: what straight lines may miss
 _ALIKE = 0.05  # of the command's range, RMS, up to which two commands are the same
 _SOONER = 1.3  # times the length of a log's baseline that the log may have
 _LATE = 0.1  # s between two logs' actions
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RoleTest:
-    """A test, counted from its onset.
+    """The test of a log, counted from its onset.
 
     Attributes
     ----------
+    log : Log
+        On an even clock whose zero is the onset; it begins `BEFORE` it.
+    rate : float
+        Hz.
     seconds : float
         After the onset.
     command : (ndarray, ndarray)
@@ -47,8 +55,12 @@ class RoleTest:
         Parameters that the stand set.
     note : str
         Stand and step that the log names, if any.
+    findings : tuple of str
+        What the caller should know.
     """
 
+    log: Log
+    rate: float
     seconds: float
     command: tuple[Floats, Floats]
     load: tuple[Floats, Floats] | None
@@ -57,10 +69,24 @@ class RoleTest:
     initial: Mapping[str, float | str]
     settings: Mapping[str, Any]
     note: str = ""
+    findings: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the log."""
+        return self.log.name
+
+    @cached_property
+    def seen(self) -> Mapping[str, Floats]:
+        """What the log shows, not what was put in: role to values, shape (n,)."""
+        own_load = {"load"} if self.own_load else set()
+        return {r: v for r, v in self.log.channels.items() if r not in INPUTS - own_load}
 
     def within(self, seconds: float) -> RoleTest:
         """Return the test up to some seconds after its onset."""
-        return replace(self, seconds=min(seconds, self.seconds))
+        keep = self.log.time < seconds * (1.0 + 1e-9)
+        log = self.log.part(keep, 0.0, seconds)
+        return replace(self, log=log, seconds=min(seconds, self.seconds))
 
 
 def action_numbers(wiring: str) -> tuple[str, ...]:
@@ -71,32 +97,32 @@ def action_numbers(wiring: str) -> tuple[str, ...]:
 
 
 def test_of(
-    recording: Recording,
+    raw: Log,
+    log: Log,
     actuator: Actuator,
-    time: Floats,
-    channels: Mapping[str, Floats],
+    *,
+    rate: float,
     seconds: float,
+    findings: Sequence[str],
 ) -> RoleTest:
-    """Return the test of a log whose roles stand on instants counted from the onset."""
-    stand = recording.meta.get("stand")
-    stand_data: Mapping[str, Any] = stand if isinstance(stand, Mapping) else {}
-    loads_itself = not stand_data and "scenario" in recording.meta and _shows_load(actuator.wiring)
-    settings = {
-        p: v for p, v in stand_data.get("parameters", {}).items() if p in actuator.parameters
-    }
-    none = loads_itself or "load" not in channels
-    load, stroke = (None, None) if none else read_load(actuator, time, channels)
+    """Return the test of a log: as it was recorded, and on instants counted from the onset."""
+    stand = raw.stand
+    loads_itself = stand.whole_load and _shows_load(actuator.wiring)
+    none = loads_itself or not log.has("load")
+    load, stroke = (None, None) if none else read_load(actuator, log.time, log.channels)
+    named = None if raw.recording is None else raw.recording.meta.get("log")
     return RoleTest(
+        log,
+        rate,
         seconds,
-        _command_of(time, channels["command"], sequence=bool(action_numbers(actuator.wiring))),
+        _command_of(log.time, log["command"], sequence=bool(action_numbers(actuator.wiring))),
         load,
         stroke,
         loads_itself,
-        {**_initial(actuator, channels), **_stated(actuator.wiring, stand_data.get("initial", {}))},
-        settings,
-        f"{stand_data['name']}: {recording.meta['log']}"
-        if stand_data and "log" in recording.meta
-        else "",
+        {**_initial(actuator, log.channels), **_stated(actuator.wiring, stand.initial)},
+        {p: v for p, v in stand.parameters.items() if p in actuator.parameters},
+        f"{stand.name}: {named}" if stand.name and named else "",
+        tuple(findings),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import SEEN
-from elevon.diagnose.bymodel.candidates import CandidateFault
+from elevon.diagnose.bymodel.candidates import CandidateFault, of_a_magnet
 from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.replay import Replay
 from elevon.diagnose.byroles.candidates import counted_of, switched_of
@@ -21,7 +21,6 @@ from elevon.diagnose.byroles.channels import (
     numbers_by,
     numbers_of_log,
 )
-from elevon.diagnose.byroles.log import RoleLog
 from elevon.diagnose.byroles.numbers import Numbers, floors
 from elevon.diagnose.byroles.role_test import RoleTest, action_numbers, same_test
 from elevon.diagnose.byroles.spread import daily, factors_of
@@ -94,18 +93,19 @@ _RECENT: list[_Remembered] = []
 
 
 def replay_by_roles(
-    item: RoleLog, actuator: Actuator, candidates: Sequence[CandidateFault]
+    item: RoleTest, actuator: Actuator, candidates: Sequence[CandidateFault]
 ) -> RoleReplay:
     """Run the test: healthy, each candidate at several severities, and the spread.
 
     Logs of one test share the runs of the first of them.
     """
+    actuator = of_a_magnet(actuator)
     entry = _Remembered(
         actuator.hash,
         tuple(candidates),
-        tuple(item.channels),
-        (len(item.time), round(item.rate)),
-        item.test,
+        tuple(item.seen),
+        (len(item.log.time), round(item.rate)),
+        item,
         None,  # type: ignore[arg-type]
     )
     for past in _RECENT:
@@ -113,7 +113,7 @@ def replay_by_roles(
             getattr(past, name) == getattr(entry, name)
             for name in ("actuator", "candidates", "roles", "clock")
         )
-        if alike and past.test.settings == item.test.settings and same_test(past.test, item.test):
+        if alike and past.test.settings == item.settings and same_test(past.test, item):
             return past.made
     compliant = _deflects(item, actuator)
     model = _replayed(item, actuator, candidates, compliant=compliant)
@@ -123,11 +123,11 @@ def replay_by_roles(
     return made
 
 
-def _deflects(item: RoleLog, actuator: Actuator) -> bool:
+def _deflects(item: RoleTest, actuator: Actuator) -> bool:
     """Whether a log is nearer to a compliant model: what faults do to a number depends on it."""
-    if deflection_under(item, as_on_stand(actuator, item.test)) is None:
+    if deflection_under(item, as_on_stand(actuator, item)) is None:
         return True
-    logged = numbers_of_log(item, actuator, item.channels).values
+    logged = numbers_of_log(item, actuator, item.seen).values
     units = [RoleUnit({}), RoleUnit({}, compliant=False)]
     both = list(numbers_by(item, actuator, units))
     names = [name for name in both[0].values if name in logged]
@@ -140,13 +140,13 @@ def _deflects(item: RoleLog, actuator: Actuator) -> bool:
 
 
 def _replayed(
-    item: RoleLog, actuator: Actuator, candidates: Sequence[CandidateFault], *, compliant: bool
+    item: RoleTest, actuator: Actuator, candidates: Sequence[CandidateFault], *, compliant: bool
 ) -> RoleReplay:
     severities = {c.key: _severities(c, actuator) for c in candidates}
     units = [RoleUnit({}), RoleUnit({})]
     for c in candidates:
         units += [RoleUnit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
-    ready = as_on_stand(actuator, item.test)
+    ready = as_on_stand(actuator, item)
     steps = _steps_of_days(len(factors_of(ready)))
     units += _days(ready, steps)
     units = [
@@ -204,7 +204,7 @@ def _days(ready: Actuator, steps: Floats) -> list[RoleUnit]:
 
 def _refined(
     model: RoleReplay,
-    item: RoleLog,
+    item: RoleTest,
     actuator: Actuator,
     candidates: Sequence[CandidateFault],
     *,

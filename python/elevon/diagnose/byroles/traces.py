@@ -9,14 +9,15 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.byroles.channels import RoleUnit, channels_by
-from elevon.diagnose.byroles.log import RoleLog, role_log
+from elevon.diagnose.byroles.log import role_log
+from elevon.diagnose.byroles.role_test import RoleTest
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.bymodel.answer import Diagnosis
-    from elevon.recording import Recording
+    from elevon.logs.log import Log
 
 __all__ = ["traces_by_roles"]
 
@@ -27,14 +28,12 @@ _DRAWN = (
 _MOST = 3
 
 
-def traces_by_roles(
-    logs: Sequence[tuple[str, Recording]], actuator: Actuator, result: Diagnosis
-) -> list[Traces]:
+def traces_by_roles(logs: Sequence[Log], actuator: Actuator, result: Diagnosis) -> list[Traces]:
     """Return each log's signals beside the healthy model's and those with what is named.
 
     Parameters
     ----------
-    logs : sequence of (str, Recording)
+    logs : sequence of Log
         Those that were diagnosed.
     actuator : Actuator
         The healthy unit.
@@ -43,19 +42,19 @@ def traces_by_roles(
     """
     texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
     units = [RoleUnit({})] + ([RoleUnit({}, texts)] if texts else [])
-    items = [role_log(recording, name, actuator) for name, recording in logs]
+    items = [role_log(log, actuator) for log in logs]
     return [_traces(item, actuator, units) for item in items]
 
 
-def _traces(item: RoleLog, actuator: Actuator, units: Sequence[RoleUnit]) -> Traces:
-    sources: list[Mapping[str, Floats]] = [item.channels, *channels_by(item, actuator, units)]
+def _traces(item: RoleTest, actuator: Actuator, units: Sequence[RoleUnit]) -> Traces:
+    sources: list[Mapping[str, Floats]] = [item.seen, *channels_by(item, actuator, units)]
     roles = [role for role in _DRAWN if all(role in channels for channels in sources)]
     panels = []
     for role in roles[:_MOST]:
-        unit = "mm" if item.units[role] == "m" else item.units[role]
+        unit = "mm" if item.log.units[role] == "m" else item.log.units[role]
         lines = [np.asarray(to_display(channels[role], unit)) for channels in sources]
         name = role.replace("_", " ").capitalize()
         panels.append(
             SignalPanel(name, unit, lines[0], lines[1], lines[2] if len(lines) > 2 else None)
         )
-    return Traces(item.name, item.time, panels)
+    return Traces(item.name, item.log.time, panels)

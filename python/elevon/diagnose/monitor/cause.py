@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.answer import SEEN, Cause
+from elevon.diagnose.bymodel.answer import SEEN, Cause, FaultPlace
 from elevon.diagnose.bymodel.candidates import CandidateFault
 from elevon.diagnose.bymodel.likelihood import prior_density
 from elevon.diagnose.bymodel.posterior import quantiles
@@ -40,7 +40,7 @@ def likely_causes(
         if probability < LISTED:
             continue
         low, middle, high = quantiles(grid, weights / weights.sum(), (0.05, 0.5, 0.95))
-        alike = tuple((c.kind, place) for place in c.same)
+        alike = tuple(FaultPlace(c.kind, place) for place in c.same)
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), alike))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 

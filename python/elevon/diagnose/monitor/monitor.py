@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.answer import Cause
 from elevon.diagnose.bymodel.candidates import chosen
-from elevon.diagnose.bymodel.log import TestLog
 from elevon.diagnose.monitor.cause import likely_causes
 from elevon.diagnose.monitor.filter import ChangeFilter
 from elevon.diagnose.monitor.reference import WindowReference, reference
@@ -28,11 +27,15 @@ from elevon.diagnose.monitor.windows import (
     window_features,
 )
 from elevon.errors import InputError
+from elevon.logs.drive import drive_log
+from elevon.plain import Plain, in_unit
+from elevon.results import Result
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
-__all__ = ["Alarm", "Monitor", "MonitorStep"]
+__all__ = ["Alarm", "Monitor", "MonitorStep", "Monitoring"]
 
 FALSE_ALARM_TIME = 3600.0  # s
 _WINDOWS = 40  # of a stream of unknown length, and the most that are simulated of a day
@@ -42,7 +45,7 @@ _SAME = 0.2  # relative difference of motion up to which a window is of the base
 
 
 @dataclass(frozen=True)
-class MonitorStep:
+class MonitorStep(Plain):
     """One window.
 
     Attributes
@@ -69,13 +72,9 @@ class MonitorStep:
     alarm: bool
     skipped: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 @dataclass(frozen=True)
-class Alarm:
+class Alarm(Plain):
     """The first window whose statistic is above one.
 
     Attributes
@@ -107,12 +106,59 @@ class Alarm:
     threshold: float
     causes: tuple[Cause, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        names = [n for n in self.__dataclass_fields__ if n != "causes"]
-        return {n: getattr(self, n) for n in names} | {
-            "causes": [cause.to_dict() for cause in self.causes]
-        }
+
+@dataclass(frozen=True)
+class Monitoring(Result):
+    """What a monitor has seen.
+
+    Attributes
+    ----------
+    alarm : Alarm or None
+        The first one.
+    window, false_alarm_time : float
+        Width of a window, and mean time between false alarms [s].
+    thresholds : mapping of str to float
+        Of the ratio, for what begins with a log (``opening``) and in it (``within``).
+    steps : tuple of MonitorStep
+        The windows.
+    findings : tuple of str
+        What the caller should know.
+    seconds : float
+        Time it took.
+    """
+
+    alarm: Alarm | None
+    window: Annotated[float, in_unit("s")]
+    false_alarm_time: Annotated[float, in_unit("s")]
+    thresholds: Mapping[str, float]
+    steps: tuple[MonitorStep, ...]
+    findings: tuple[str, ...]
+    seconds: Annotated[float, in_unit("s")] = field(default=0.0, compare=False)
+
+    KIND: ClassVar = "monitoring"
+    COMPUTED: ClassVar = ("status",)
+    TABLE: ClassVar = "steps"
+    BARS: ClassVar = ("end", "statistic")
+
+    @property
+    def status(self) -> str:
+        """``quiet`` or ``alarm``."""
+        return "quiet" if self.alarm is None else "alarm"
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        used = [step for step in self.steps if not step.skipped]
+        if self.alarm is None:
+            return (
+                f"No alarm in {len(used)} windows of {self.window:g} s: the statistic came to "
+                f"{max(step.statistic for step in used):.2g} of its threshold."
+            )
+        return (
+            f"Alarm at {self.alarm.time:g} s of {self.alarm.log}: statistic "
+            f"{self.alarm.statistic:.3g} of its threshold; most likely since {self.alarm.since:g} "
+            f"s of {self.alarm.since_log} ({self.alarm.delay:g} s watched since)."
+        )
 
 
 @dataclass
@@ -126,7 +172,7 @@ class Monitor:
     ----------
     actuator : Actuator
         The healthy unit, calibrated.
-    baselines : sequence of TestLog
+    baselines : sequence of Log
         Of the healthy unit in the motion that is watched; three windows at least.
     window : float, optional
         Width [s]: one period of the motion, or several. Default: the period of a noted sine.
@@ -147,7 +193,7 @@ class Monitor:
     """
 
     actuator: Actuator
-    baselines: Sequence[TestLog]
+    baselines: Sequence[Log]
     window: float | None = None
     false_alarm_time: float = FALSE_ALARM_TIME
     faults: Sequence[str] | None = None
@@ -159,6 +205,7 @@ class Monitor:
 
     def __post_init__(self) -> None:
         self._check()
+        self.baselines = [drive_log(log) for log in self.baselines]
         self._candidates = chosen(self.faults)
         self.width = period(self.baselines[0], self.window)
         self._reference = reference(self.actuator, self.baselines, self._candidates, self.width)
@@ -193,9 +240,10 @@ class Monitor:
         self._moves = False
         self._filter.new_day()
 
-    def feed_log(self, item: TestLog) -> list[MonitorStep]:
+    def feed_log(self, item: Log) -> list[MonitorStep]:
         """Take a whole log, as a day of its own; return a step for each whole window."""
         self.new_day()
+        item = drive_log(item)
         parts = cut(item, self.width, start=run_in(item, self._top) or 0.0)
         return [self.feed_window(part, start) for start, part in parts]
 
@@ -224,7 +272,7 @@ class Monitor:
         while len(time) and time[-1] >= time[0] + self.width:
             inside = time < time[0] + self.width - 0.5 * (time[1] - time[0])
             part = {name: values[inside] for name, values in pending.items()}
-            item = of_samples(part, self.baselines[0].log.note, "stream")
+            item = of_samples(part, self.baselines[0].note, "stream")
             if not self._moves:
                 lead = run_in(item, self._top)
                 self._moves = lead is not None
@@ -238,7 +286,7 @@ class Monitor:
         self._pending = {name: [values] for name, values in pending.items()}
         return out
 
-    def feed_window(self, item: TestLog, start: float = 0.0) -> MonitorStep:
+    def feed_window(self, item: Log, start: float = 0.0) -> MonitorStep:
         """Take one window, which begins at `start` [s]; return what it says."""
         step = self._step(item, start)
         self.steps.append(step)
@@ -246,17 +294,11 @@ class Monitor:
             self.alarm = self._alarm(step, opening=self._opening)
         return step
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "status": "quiet" if self.alarm is None else "alarm",
-            "alarm": None if self.alarm is None else self.alarm.to_dict(),
-            "window": self.width,
-            "false_alarm_time": self.false_alarm_time,
-            "thresholds": {"opening": self.thresholds.opening, "within": self.thresholds.within},
-            "steps": [step.to_dict() for step in self.steps],
-            "findings": list(self.findings),
-        }
+    def result(self) -> Monitoring:
+        """Return what it has seen so far."""
+        levels = {"opening": self.thresholds.opening, "within": self.thresholds.within}
+        steps, findings = tuple(self.steps), tuple(self.findings)
+        return Monitoring(self.alarm, self.width, self.false_alarm_time, levels, steps, findings)
 
     def _check(self) -> None:
         if self.actuator.wiring != "rotary":
@@ -296,7 +338,7 @@ class Monitor:
                 "partly assumed"
             )
 
-    def _step(self, item: TestLog, start: float) -> MonitorStep:
+    def _step(self, item: Log, start: float) -> MonitorStep:
         end = start + self.width
         if any(
             abs(a - b) > _SAME * max(abs(a), abs(b))

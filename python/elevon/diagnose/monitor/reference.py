@@ -13,7 +13,7 @@ from elevon.diagnose.bymodel.candidates import CandidateFault
 from elevon.diagnose.bymodel.case import LogCase
 from elevon.diagnose.bymodel.features import FeatureVector
 from elevon.diagnose.bymodel.healthy import DEGREES, healthy
-from elevon.diagnose.bymodel.log import RUN_IN, TestLog, prepared
+from elevon.diagnose.bymodel.log import RUN_IN, prepared
 from elevon.diagnose.bymodel.replay import replay
 from elevon.diagnose.monitor.filter import WindowSpread
 from elevon.diagnose.monitor.windows import cut, run_in, stretch, top_speed, window_features
@@ -21,6 +21,7 @@ from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
 __all__ = ["MEMORY", "WindowReference", "reference"]
 
@@ -74,7 +75,7 @@ class WindowReference:
 
 def reference(
     actuator: Actuator,
-    baselines: Sequence[TestLog],
+    baselines: Sequence[Log],
     candidates: Sequence[CandidateFault],
     width: float,
 ) -> WindowReference:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import chain, combinations
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Explanation
+from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Explanation, FaultPlace, SuspectedFault
 from elevon.diagnose.bymodel.candidates import CandidateFault, chosen
 from elevon.diagnose.bymodel.diagnosis import check_request
 from elevon.diagnose.bymodel.explain import POSSIBLE
@@ -20,7 +20,7 @@ from elevon.errors import ElevonError, InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.log import TestLog
+    from elevon.logs.log import Log
 
 __all__ = ["diagnose_by_both", "diagnose_by_surrogate"]
 
@@ -29,10 +29,10 @@ LEAST_PROPOSED = 3  # causes that the model is given at least
 
 
 def diagnose_by_surrogate(
-    logs: Sequence[TestLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
-    baselines: Sequence[TestLog] = (),
+    baselines: Sequence[Log] = (),
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
     surrogate: Surrogate | None = None,
@@ -41,11 +41,11 @@ def diagnose_by_surrogate(
 
     Parameters
     ----------
-    logs : sequence of TestLog
+    logs : sequence of Log
         Of one unit in one condition.
     actuator : Actuator
         Gear ratio and pole pairs are used, nothing else.
-    baselines : sequence of TestLog
+    baselines : sequence of Log
         Of the healthy unit; those of the same test serve.
     faults : sequence of str, optional
         ``KIND@PLACE`` of the candidates; default: all that were trained.
@@ -91,11 +91,12 @@ def diagnose_by_surrogate(
         detectable={
             k: v for k, v in proposal.detectable.items() if k in {c.key for c in candidates}
         },
-        moved=proposal.moved,
+        features=proposal.moved,
         findings=tuple(findings),
         seconds=clock.perf_counter() - begin,
         hypotheses=_explanations(proposal, candidates),
-        units={c.key: c.unit for c in candidates},
+        severity_units={c.key: c.unit for c in candidates},
+        method="surrogate",
     )
 
 
@@ -126,7 +127,7 @@ def _causes(
         p = proposal.probability[c.key]
         if p >= LISTED or c.key in best:
             middle, low, high = proposal.severity[c.key]
-            alike = tuple((c.kind, place) for place in c.same)
+            alike = tuple(FaultPlace(c.kind, place) for place in c.same)
             out.append(Cause(c.kind, c.place, c.unit, p, middle, (low, high), alike))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
@@ -143,15 +144,14 @@ def _explanations(
     shares = [(proposal.p_fault * odds / total, keys) for odds, keys in rows]
     shares.append((1.0 - proposal.p_fault, ()))
     return tuple(
-        Explanation(
-            tuple((c.kind, c.place, c.unit) for c in keys),
-            share,
-            tuple(proposal.severity[c.key][0] for c in keys),
-            tuple(proposal.severity[c.key][1:] for c in keys),
-        )
+        Explanation(tuple(_suspected(c, proposal.severity[c.key]) for c in keys), share)
         for share, keys in sorted(shares, key=lambda row: -row[0])
         if share >= POSSIBLE
     )
+
+
+def _suspected(c: CandidateFault, severity: tuple[float, float, float]) -> SuspectedFault:
+    return SuspectedFault(c.kind, c.place, severity[0], c.unit, severity[1:])
 
 
 def _blind(proposal: Proposal, candidates: Sequence[CandidateFault]) -> tuple[dict[str, str], ...]:
@@ -164,10 +164,10 @@ def _blind(proposal: Proposal, candidates: Sequence[CandidateFault]) -> tuple[di
 
 
 def diagnose_by_both(
-    logs: Sequence[TestLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
-    baselines: Sequence[TestLog] = (),
+    baselines: Sequence[Log] = (),
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
     surrogate: Surrogate | None = None,
@@ -188,9 +188,9 @@ def diagnose_by_both(
 
 
 def _proposal(
-    logs: Sequence[TestLog],
+    logs: Sequence[Log],
     actuator: Actuator,
-    baselines: Sequence[TestLog],
+    baselines: Sequence[Log],
     candidates: Sequence[CandidateFault],
     surrogate: Surrogate | None,
 ) -> tuple[list[str], str]:

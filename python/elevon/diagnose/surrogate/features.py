@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.features import DriveSignals, features_of, median
-from elevon.diagnose.bymodel.log import RUN_IN, TestLog
+from elevon.diagnose.bymodel.features import features_of, median
+from elevon.diagnose.bymodel.log import RUN_IN
 from elevon.errors import InputError
+from elevon.logs.drive import drive_log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.calibrate.log import BenchLog
+    from elevon.logs.log import Log
 
 __all__ = ["NAMES", "SCALES", "VOLTAGE", "SurrogateFeatures", "changes", "log_features"]
 
@@ -75,13 +76,13 @@ class SurrogateFeatures:
     speed: float
 
 
-def log_features(item: TestLog, actuator: Actuator) -> SurrogateFeatures:
+def log_features(log: Log, actuator: Actuator) -> SurrogateFeatures:
     """Compute the features of a log.
 
     Parameters
     ----------
-    item : TestLog
-        From `elevon.diagnose.bymodel.read_test_logs`.
+    log : Log
+        Of a drive.
     actuator : Actuator
         Its gear ratio and pole pairs are used, nothing else.
 
@@ -90,25 +91,21 @@ def log_features(item: TestLog, actuator: Actuator) -> SurrogateFeatures:
     InputError
         A position or the measured torque current is missing, or nothing moves.
     """
-    log = item.log
-    if log.output is None or log.motor is None:
+    log = drive_log(log)
+    if not log.has("output_position", "motor_position"):
         raise InputError(f"{log.name}: the surrogate needs both positions (r4820, r4821)")
-    if log.current_signal != "current_q_meas":
+    if not log.has("torque_current"):
         raise InputError(f"{log.name}: the surrogate needs the measured torque current (r78)")
     good = log.good & (log.time >= RUN_IN) & np.isfinite(log.motor) & np.isfinite(log.output)
     top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
     if top < 1.0:
         raise InputError(f"{log.name}: nothing moves (motor up to {top:.3g} rad/s)")
-    brake = np.interp(log.time, log.brake.time, log.brake.level) if item.braked else None
-    signals = DriveSignals(
-        log.time, log.output, log.motor, log.speed_ref, log.speed, log.current_target,
-        log.current, item.voltage, brake, None, None, good,
-    )  # fmt: skip
     value = actuator.parameters.value
     ratio, pole_pairs = value("gear.ratio"), value("motor.pole_pairs")
     features = features_of(
-        signals, ratio=ratio, pole_pairs=pole_pairs, emf=1.0, deviations=False, shaft=False
-    )
+        replace(log, good=good), ratio=ratio, pole_pairs=pole_pairs, emf=1.0, deviations=False,
+        shaft=False,
+    )  # fmt: skip
     rows = dict(zip(features.names, features.values.tolist(), strict=True))
     for name in ("voltage_order_1", "voltage_order_2"):  # of the log's own EMF, not the actuator's
         if name in rows:
@@ -117,7 +114,7 @@ def log_features(item: TestLog, actuator: Actuator) -> SurrogateFeatures:
     return SurrogateFeatures(
         log.name,
         np.array([rows.get(name, math.nan) for name in NAMES]),
-        item.braked,
+        log.brake.measured,
         float(np.std(log.output)),
         float(np.sqrt(np.mean(log.speed**2))),
     )
@@ -138,7 +135,7 @@ def changes(values: Floats, healthy: Floats, floor: Floats) -> Floats:
     return np.asarray((values - healthy) / size)
 
 
-def _following(log: BenchLog, good: npt.NDArray[np.bool_]) -> float:
+def _following(log: Log, good: npt.NDArray[np.bool_]) -> float:
     """Following error over speed set point [s], of a noted sine; NaN without one.
 
     The command is a sine of nearly the noted frequency: output + following x set point = a sin + b
@@ -147,7 +144,7 @@ def _following(log: BenchLog, good: npt.NDArray[np.bool_]) -> float:
     """
     note = log.note
     frequency = note.parameters.get("frequency") if note and note.waveform == "sine" else None
-    if not frequency or log.output is None:
+    if not frequency or not log.has("output_position"):
         return math.nan
     reference = np.abs(log.speed_ref)
     keep = good & (reference < 0.999 * reference.max()) & (log.time > _SETTLED)

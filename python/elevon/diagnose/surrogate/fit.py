@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.surrogate.campaign import TrainingTable
 from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
 from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
 from elevon.diagnose.surrogate.network import (
@@ -24,6 +23,7 @@ from elevon.diagnose.surrogate.network import (
 )
 from elevon.diagnose.surrogate.population import ALIKE, FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, sizes
+from elevon.diagnose.surrogate.table import TrainingTable
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.progress import Progress, part
 
@@ -313,7 +313,7 @@ def _named(opinion: Opinion, scaling: Floats, severity: Floats) -> Floats:
     return out
 
 
-def scores(head: Head, opinion: Opinion, severity: Floats, chance: Floats) -> dict[str, Any]:
+def scores(head: Head, opinion: Opinion, severity: Floats, chance: Floats) -> dict[str, object]:
     """Return what an opinion of held-out runs is worth.
 
     `chance`, shape (n,), is how often a healthy unit looks as faulty.

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.surrogate.campaign import SINGLE_FAULTS, TrainingTable
 from elevon.diagnose.surrogate.fit import FALSE_ALARM, scores
 from elevon.diagnose.surrogate.model import Head, Surrogate
 from elevon.diagnose.surrogate.network import Opinion, honest
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, severities
+from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
 
 __all__ = ["judged", "judged_at"]
 

@@ -20,7 +20,7 @@ from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.log import TestLog
+    from elevon.logs.log import Log
 
 __all__ = ["Proposal", "proposed"]
 
@@ -73,10 +73,10 @@ class _Read:
 
 
 def proposed(
-    logs: Sequence[TestLog],
+    logs: Sequence[Log],
     actuator: Actuator,
     *,
-    baselines: Sequence[TestLog] = (),
+    baselines: Sequence[Log] = (),
     surrogate: Surrogate | None = None,
 ) -> Proposal:
     """Ask the surrogate; arguments and errors as `diagnose_by_surrogate`."""

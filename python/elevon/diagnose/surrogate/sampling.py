@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.bymodel.healthy import FLOOR
-from elevon.diagnose.surrogate.campaign import TrainingTable
 from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.network import Batch
 from elevon.diagnose.surrogate.population import learned
+from elevon.diagnose.surrogate.table import TrainingTable
 from elevon.diagnose.surrogate.view import View, hidden
 
 __all__ = ["Rows", "limits", "severities", "sizes"]

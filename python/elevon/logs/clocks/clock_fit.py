@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from elevon.logs.covariance import correlated, long_run_covariance
+from elevon.estimate.covariance import correlated, long_run_covariance
 
 __all__ = ["RESONATOR_STD", "RESONATOR_TOLERANCE", "ClockEstimate", "SharedLogs", "fit_clock"]
 

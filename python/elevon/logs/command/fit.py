@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, unknown
+from elevon.estimate.covariance import robust_covariance
+from elevon.estimate.residual import ResidualFit, fit_residual
 from elevon.logs.command.guess import FREE, guesses
 from elevon.logs.command.reconstruct import CommandTrace
-from elevon.logs.covariance import robust_covariance
 from elevon.waveforms import evaluate, wave_records
 
 __all__ = ["FREE", "WaveformFit", "best_waveform", "fit_waveform"]
@@ -73,11 +73,6 @@ class WaveformFit:
     def at(self, time: npt.ArrayLike) -> FloatArray:
         """Return the fitted command [rad] at instants [s]."""
         return evaluate(self.kind, self.values, np.asarray(time, dtype=np.float64))
-
-    def as_term(self) -> dict[str, float | str]:
-        """Return the command as a scenario's term: SI numbers, infinite ends left out."""
-        finite = {name: v for name, v in self.values.items() if math.isfinite(v)}
-        return {"kind": self.kind, **finite}
 
 
 def fit_waveform(
@@ -230,22 +225,11 @@ def _best(
     spread = float(np.ptp(t))
     scale = np.array([_typical(name, y, spread) for name in free])
 
-    def solve(base: Mapping[str, float], x0: FloatArray, most: int) -> Any:
-        from scipy.optimize import least_squares
-
-        def residual(x: FloatArray) -> FloatArray:
-            return _model(kind, base, free, x, t) - y
-
-        return least_squares(
-            residual,
-            x0,
-            jac="3-point",
-            x_scale=scale,
-            xtol=1e-13,
-            ftol=1e-13,
-            gtol=1e-13,
-            max_nfev=most,
-        )
+    def solve(base: Mapping[str, float], x0: FloatArray, most: int) -> ResidualFit:
+        return fit_residual(
+            lambda x: _model(kind, base, free, x, t) - y, x0, jacobian="3-point", scale=scale,
+            tolerance=1e-13, most=most,
+        )  # fmt: skip
 
     results = []
     for guess in [start] if start is not None else guesses(kind, t, y, known):
@@ -253,11 +237,11 @@ def _best(
         if not free:
             return base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True
         rough = solve(base, np.array([base[name] for name in free]), _ROUGH)
-        results.append((float(rough.cost), base, rough))
+        results.append((rough.cost, base, rough))
     _, base, rough = min(results, key=lambda item: item[0])
-    solution = rough if rough.status > 0 else solve(base, rough.x, _MOST)
+    solution = rough if rough.converged else solve(base, rough.x, _MOST)
     values = {**base, **dict(zip(free, map(float, solution.x), strict=True))}
-    return values, np.asarray(solution.jac), -np.asarray(solution.fun), bool(solution.success)
+    return values, solution.jacobian, -solution.residual, solution.converged
 
 
 def _model(

@@ -101,7 +101,7 @@ class BacklashResult:
         }
 
 
-def no_load_scenario() -> dict[str, Any]:
+def no_load_scenario() -> dict[str, object]:
     """Return the command of the campaign: 7 deg about 10 deg at 0.2 Hz, nothing attached."""
     sine = {"kind": "sine", "amplitude": "7 deg", "bias": "10 deg", "frequency": f"{FREQUENCY} Hz"}
     return {"duration": f"{DURATION} s", "command": {"mode": "position", "terms": [sine]}}

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from elevon.calibrate.slips import Slip, WeightDrop, find_slips, printed_drops
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.compliance.fit import (
     Array,
@@ -19,7 +20,6 @@ from elevon.reproduce.compliance.fit import (
     load_on_loss,
     loss_on_load,
 )
-from elevon.reproduce.compliance.slips import Slip, WeightDrop, find_slips, printed_drops
 
 __all__ = ["AngleColumns", "ComplianceResult", "reproduce_compliance"]
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError
+from elevon.estimate.regression import huber
 
 __all__ = [
     "ComplianceFit",
@@ -27,11 +28,6 @@ __all__ = [
 ]
 
 Array = npt.NDArray[np.float64]
-_HUBER = 1.345
-"""Residuals beyond this many standard deviations weigh less: 95 % efficient without outliers."""
-
-_CONVERGED = 1e-6
-"""Weights that move less than this leave the stiffness alone to seven digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,18 +128,12 @@ def fit_compliance(
         raise InputError(
             f"compliance: {len(load)} observations do not determine {design.shape[1]} unknowns"
         )
-    weights = np.ones(len(load))
-    for _ in range(100 if robust else 1):
-        weighted = design * weights[:, None]
-        solved = np.linalg.solve(weighted.T @ design, weighted.T @ loss)
-        beta: Array = np.asarray(solved, dtype=np.float64)
-        residuals: Array = np.asarray(loss - design @ beta, dtype=np.float64)
-        scale = 1.4826 * float(np.median(np.abs(residuals)))
-        fresh = _weights(residuals, scale) if robust else weights
-        moved = float(np.abs(fresh - weights).max())
-        weights = fresh
-        if moved < _CONVERGED:
-            break
+    if robust:
+        beta, residuals, weights = huber(design, loss)
+    else:
+        beta = np.asarray(np.linalg.lstsq(design, loss, rcond=None)[0], dtype=np.float64)
+        residuals, weights = loss - design @ beta, np.ones(len(load))
+    scale = 1.4826 * float(np.median(np.abs(residuals)))
     return ComplianceFit(1.0 / beta[0], float(beta[1]), beta[2:], residuals, weights, scale)
 
 
@@ -205,8 +195,3 @@ def _design(load: Array, group: npt.ArrayLike | None) -> Array:
         labels = np.asarray(group)
         columns += [(labels == label).astype(float) for label in np.unique(labels) if label != 0]
     return np.column_stack(columns)
-
-
-def _weights(residuals: Array, scale: float) -> Array:
-    size = np.maximum(np.abs(residuals), 1e-300)
-    return np.minimum(1.0, _HUBER * scale / size)

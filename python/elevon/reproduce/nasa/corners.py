@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +22,7 @@ DURATION = 8.0
 SETTLE = 1.0
 
 
-def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[dict[str, Any]]:
+def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[dict[str, object]]:
     """Return peak and rms current and the tracking error, sharp and rounded, unloaded and loaded.
 
     Raises

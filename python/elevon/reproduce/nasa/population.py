@@ -166,7 +166,7 @@ def _efficiencies(actuator: Actuator, factor: float) -> dict[str, float]:
     }
 
 
-def spread_rows() -> list[dict[str, Any]]:
+def spread_rows() -> list[dict[str, object]]:
     """Return the spreads as rows of a report: property, deviation and reason."""
     rows: dict[str, dict[str, Any]] = {}
     for spread in SPREADS:

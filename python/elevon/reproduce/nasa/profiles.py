@@ -127,7 +127,7 @@ class MotionProfile:
 
 def profile_scenario(
     profile: MotionProfile, load: float = 0.0, kind: LoadKind = "constant", opposing: float = 0.0
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the scenario of a profile under a load.
 
     Parameters

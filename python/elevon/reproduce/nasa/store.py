@@ -18,7 +18,7 @@ __all__ = ["CellStore", "work_key"]
 Array = npt.NDArray[np.float64]
 
 
-def work_key(**facts: Any) -> str:
+def work_key(**facts: object) -> str:
     """Return digits that tell one piece of work from any other: equal facts, equal digits."""
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

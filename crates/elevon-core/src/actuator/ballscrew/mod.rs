@@ -24,6 +24,7 @@ impl Machine for Ballscrew {
     const GROUPS: &'static [Group] = records::GROUPS;
     const PORTS: &'static [Port] = records::PORTS;
     const LATE_PORTS: &'static [usize] = &[layout::BRAKE, layout::OUTPUT];
+    const HELD_PORTS: &'static [usize] = &[layout::AMBIENT];
 
     fn faults() -> Vec<FaultKind> {
         faults::catalogue()

@@ -1,6 +1,6 @@
 //! The records of the ballscrew actuator: those of a servo in the units of a travelling output, and the screw's own.
 
-use crate::actuator::servo::layout::{self, At as _, COMMAND};
+use crate::actuator::servo::layout::{self, At as _, AMBIENT, COMMAND, SUPPLY};
 use crate::actuator::servo::signals::{self, HighSignal as H, LowSignal as L};
 use crate::actuator::{Finding, Port};
 use crate::control::position_speed::{ControlParameter as C, CONTROL};
@@ -96,7 +96,8 @@ pub const PORTS: &[Port] = &[
     Port { name: "brake", unit: "N", text: "resistive force on the load side: opposes motion of either direction", parameter: "" },
     Port { name: "shaft", unit: "N m", text: "signed torque on the motor shaft, positive opposes positive motion", parameter: "" },
     Port { name: "output", unit: "N", text: "signed force on the load side, positive (compressive) opposes extension", parameter: "" },
-    Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
+    layout::PORTS[SUPPLY],
+    layout::PORTS[AMBIENT],
 ];
 
 const fn signal(name: &'static str, unit: &'static str, text: &'static str) -> Signal {

@@ -11,7 +11,7 @@ use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
 use crate::inverter::six_step::{Chopping, SixStep, SixStepParameter};
 use crate::inverter::supply::{Link, Supply};
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star};
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::Scalar;
 use crate::sensor::hall::{Hall, HallState};
 use crate::sensor::proximity::ProximityParameter;
 use crate::three;
@@ -65,6 +65,7 @@ pub struct Constants<S> {
     resistance_factor: S,
     flux_factor: S,
     temperature: S,
+    ambient: S,
     per_control_period: S,
     cell_noise: S,
     /// 1 while the release's cable pulls.
@@ -122,6 +123,7 @@ impl<S: Scalar> Constants<S> {
             resistance_factor: S::one() + at(MotorParameter::TemperatureCoefficient.at()) * rise,
             flux_factor: S::one() + at(MotorParameter::FluxTemperatureCoefficient.at()) * rise,
             temperature: at(MotorParameter::WindingTemperature.at()),
+            ambient: at(LubricantStateParameter::Temperature.at()),
             per_control_period: S::one() / at(PiRateParameter::Period.at()),
             cell_noise: at(CellParameter::LoadCellNoise.at()),
             cable: S::one() - S::indicator(S::splat(0.5).le(at(ReleaseParameter::CableFailed.at()))),
@@ -182,7 +184,7 @@ impl<S: Scalar> Constants<S> {
             let plant = PlantSignals {
                 time: t.lane(lane),
                 command: command.lane(lane),
-                on_wheels: wheels.lane(lane),
+                on_wheels: wheels.lane(lane) > 0.5,
                 supply: s.link.lane(lane),
                 bus: bus.lane(lane),
                 speed: speed.lane(lane),
@@ -217,19 +219,9 @@ impl<S: Scalar> Constants<S> {
     #[inline(always)]
     pub fn coupling(&self, structure: &Structure, motor_position: S) -> ([S; 3], S) {
         let angle = self.star.electrical_angle(motor_position);
-        let plain = structure.motor.trapezoidal && !structure.motor.static_eccentricity;
+        let plain = structure.motor.trapezoidal && !structure.motor.modulated();
         let (sin, cos) = if plain { (S::zero(), S::one()) } else { angle.sin_cos() };
-        let shape = if structure.motor.trapezoidal { self.star.trapezoid(angle) } else { three_phase(sin, cos).0 };
-        let mut gap = [self.flux_factor; 3];
-        if structure.motor.static_eccentricity {
-            let fixed = self.star.static_gap(sin, cos);
-            gap = three!(|j| gap[j] * fixed[j]);
-        }
-        if structure.motor.dynamic_eccentricity {
-            let turning = self.star.dynamic_gap(motor_position);
-            gap = three!(|j| gap[j] * turning[j]);
-        }
-        (self.star.coefficients(shape, gap), angle)
+        (self.star.coefficients::<true>(&structure.motor, None, motor_position, [sin, cos], Some(self.flux_factor)), angle)
     }
 
     #[inline(always)]
@@ -301,6 +293,7 @@ impl<S: Scalar> Constants<S> {
         set(Q::HallB, s.hall.code[1]);
         set(Q::HallC, s.hall.code[2]);
         set(Q::WindingTemperature, self.temperature);
+        set(Q::AmbientTemperature, self.ambient);
         set(Q::SoftwareBrake, s.short);
         set(Q::LoadCell, s.motion.rig_force + s.cell_noise);
     }
@@ -366,6 +359,7 @@ impl<S: Scalar> Body<S> {
         set(Q::Proximity25, flag(&|u| u.switches.reading[1]));
         set(Q::Proximity75, flag(&|u| u.switches.reading[2]));
         set(Q::Proximity100, flag(&|u| u.switches.reading[3]));
+        set(Q::ProximityWheels, flag(&|u| u.switches.reading[4]));
     }
 
     /// Positive where something went otherwise than commanded.

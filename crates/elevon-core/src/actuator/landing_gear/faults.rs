@@ -15,7 +15,12 @@ const fn attribute(name: &'static str, unit: &'static str, path: &'static str, t
 }
 
 fn motor() -> Vec<FaultKind> {
-    const PHASE: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_static_phase", "electrical phase angle of the narrow gap")];
+    const PHASE: &[Attribute] = &[attribute(
+        "phase",
+        "rad",
+        "motor.eccentricity_static_phase",
+        "phase angle of the narrow gap: electrical in the published law, round the stator in the periodic one",
+    )];
     const PHASE_DYNAMIC: &[Attribute] =
         &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
     vec![
@@ -52,8 +57,8 @@ fn motor() -> Vec<FaultKind> {
             range: Range::Between(0.0, 0.9),
             attributes: PHASE,
             places: places!("motor": "motor.eccentricity_static" Add),
-            effect: "k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)); torque ripple at the electrical frequency",
-            source: "T2 (eccentricity coefficient zeta, phi)",
+            effect: "motor.eccentricity_law = published: k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)), torque ripple at the electrical frequency and an EMF with a mean over a turn; periodic: k_j (1 + zeta cos(phi - 2 pi (j-1)/3)), unequal amplitudes",
+            source: "T2 (eccentricity coefficient zeta, phi); periodic law ASSUMED: a phase's coils stand together",
         },
         FaultKind {
             kind: "eccentricity_dynamic",
@@ -61,7 +66,7 @@ fn motor() -> Vec<FaultKind> {
             range: Range::Between(0.0, 0.9),
             attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
-            effect: "fraction of the air gap; the modulation turns with the shaft (law ASSUMED: the paper names the fault only)",
+            effect: "fraction of the air gap; the modulation of k_j turns with the shaft, or that of the flux (motor.eccentricity_law; both ASSUMED: the paper names the fault only)",
             source: "N 4.4 and 5.1",
         },
         FaultKind {
@@ -170,7 +175,7 @@ fn sensors() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("sensor.proximity_0": "proximity.on_0" Set, "sensor.proximity_25": "proximity.on_25" Set, "sensor.proximity_75": "proximity.on_75" Set, "sensor.proximity_100": "proximity.on_100" Set),
+            places: places!("sensor.proximity_0": "proximity.on_0" Set, "sensor.proximity_25": "proximity.on_25" Set, "sensor.proximity_75": "proximity.on_75" Set, "sensor.proximity_100": "proximity.on_100" Set, "sensor.weight_on_wheels": "proximity.on_wheels" Set),
             effect: "1: the switch always reads on",
             source: "ASSUMED: the usual failure of an inductive switch",
         },
@@ -179,7 +184,7 @@ fn sensors() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("sensor.proximity_0": "proximity.off_0" Set, "sensor.proximity_25": "proximity.off_25" Set, "sensor.proximity_75": "proximity.off_75" Set, "sensor.proximity_100": "proximity.off_100" Set),
+            places: places!("sensor.proximity_0": "proximity.off_0" Set, "sensor.proximity_25": "proximity.off_25" Set, "sensor.proximity_75": "proximity.off_75" Set, "sensor.proximity_100": "proximity.off_100" Set, "sensor.weight_on_wheels": "proximity.off_wheels" Set),
             effect: "1: the switch never reads on",
             source: "ASSUMED: broken wire",
         },

@@ -51,6 +51,14 @@ variables! {
 }
 
 variables! {
+    /// The lubricant's temperature: nothing here warms it.
+    LubricantStateParameter, LUBRICANT_STATE {
+        Temperature => "temperature", "T_l", "K", Positive, Plant, Some(293.15), "temperature of the lubricant, where no input `ambient` sets it",
+            when(&[Either(&[Away("lubricant.viscosity_rate", 0.0), Away("lubricant.loss_rate", 0.0), Away("lubricant.dry_rate", 0.0)])]);
+    }
+}
+
+variables! {
     /// The load cell of the friction rig.
     CellParameter, CELL {
         LoadCellNoise => "load_cell_noise", "-", "N", NonNegative, Sensor, Some(0.0), "standard deviation of the load cell's noise, held over a control period";
@@ -128,6 +136,7 @@ groups! {
     leg: "leg", LEG, LegParameter;
     load: "load", LOAD_CURVE, LoadCurveParameter;
     friction: "friction", TRAIN_FRICTION, TrainFrictionParameter;
+    lubricant_state: "lubricant", LUBRICANT_STATE, LubricantStateParameter;
     lubricant: "lubricant", LUBRICANT, LubricantParameter;
     brake: "brake", BRAKE, BrakeParameter;
     lock: "lock", LOCK, LockParameter;
@@ -152,6 +161,12 @@ pub const PORTS: &[Port] = &[
     Port { name: "supply", unit: "V", text: "voltage of the source", parameter: "inverter.supply_voltage" },
     Port { name: "weight_on_wheels", unit: "1", text: "1: the aircraft stands on its wheels", parameter: "" },
     Port { name: "rig_speed", unit: "m/s", text: "speed that the friction rig imposes on the ram, in place of the leg", parameter: "" },
+    Port {
+        name: "ambient",
+        unit: "K",
+        text: "temperature of the air, which the lubricant has, held over 10 ms",
+        parameter: "lubricant.temperature",
+    },
 ];
 
 pub const COMMAND: usize = 0;
@@ -159,3 +174,4 @@ pub const OUTPUT: usize = 1;
 pub const SUPPLY: usize = 2;
 pub const WHEELS: usize = 3;
 pub const RIG: usize = 4;
+pub const AMBIENT: usize = 5;

@@ -30,6 +30,7 @@ pub struct LandingGear;
 impl Machine for LandingGear {
     const GROUPS: &'static [Group] = layout::GROUPS;
     const PORTS: &'static [Port] = layout::PORTS;
+    const HELD_PORTS: &'static [usize] = &[layout::AMBIENT];
     const MODES: &'static [&'static str] = &["gear"];
     const MODE_UNITS: &'static [&'static str] = &[""];
     const ACTIONS: &'static [&'static str] = sequence::COMMANDS;

@@ -6,10 +6,10 @@ signals! {
     /// Signals of both fidelities; the reduced-order model leaves out the phases (`PHASES`).
     Quantity, ALL {
         Command => "command", "-", "1", "0 stop, 1 extend, 2 retract, 3 free fall", Command;
-        State => "state", "-", "1", "0 retracted, 1 extending, 2 locked, 3 retracting, 4 stopped, 5 released, 6 fault", State;
+        State => "state", "-", "1", "0 retracted, 1 extending, 2 locked, 3 retracting, 4 stopped, 5 released, 6 fault, 7 unconfirmed, 8 off", State;
         CommandRefused => "command_refused", "-", "1", "why the last command was refused: 1 released, 2 fault, 3 undervoltage, 4 overvoltage, 5 weight on wheels, 6 locked, 7 repeated; 0 accepted";
-        FaultCode => "fault_code", "-", "1", "1 motion, 2 lock not released, 3 lock not engaged, 4 stalled, 5 overspeed, 6 overcurrent, 7 hall, 8 proximity, 9 drive tripped, 10 uncommanded motion; 0 none", FaultCode;
-        WarningCode => "warning_code", "-", "1", "1 drag: the current is above what any healthy load needs; 0 none";
+        FaultCode => "fault_code", "-", "1", "1 motion, 2 lock not released, 3 lock not engaged, 4 stalled, 5 overspeed, 6 overcurrent, 7 hall, 8 proximity, 9 drive tripped, 10 uncommanded motion, 11 supply in motion, 12 weight on wheels, 13 no motor current, 14 unit without power; 0 none", FaultCode;
+        WarningCode => "warning_code", "-", "1", "1 drag: the current is above what any healthy load needs, 2 switch at 0 %, 3 switch at 25 %, 4 switch at 75 %, 5 lock switch, 6 wheels switch, 7 hall power interrupted, 8 switches contradict each other; 0 none";
         OutputPosition => "output_position", "x_a", "m", "position of the ram", OutputPosition;
         OutputSpeed => "output_speed", "v_a", "m/s", "speed of the ram", OutputSpeed;
         NutPosition => "nut_position", "x_n", "m", "position of the nut, from retracted; beyond the stroke it works the lock";
@@ -43,11 +43,13 @@ signals! {
         Proximity25 => "proximity_25", "-", "1", "switch at 25 %", Switch25;
         Proximity75 => "proximity_75", "-", "1", "switch at 75 %", Switch75;
         Proximity100 => "proximity_100", "-", "1", "switch on the lock sleeve", Switch100;
+        ProximityWheels => "proximity_wheels", "-", "1", "weight-on-wheels switch";
         LeverAngle => "lever_angle", "alpha_c", "rad", "swing of the leg from retracted";
         LeverArm => "lever_arm", "h_a", "m", "effective lever arm dx_a/dalpha";
         Inertia => "equivalent_inertia", "J_tot", "kg m2", "inertia of everything connected, at the motor";
         LoadCell => "load_cell", "F_LC", "N", "force of the friction rig on the ram, with the cell's noise", LoadCell;
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
+        AmbientTemperature => "ambient_temperature", "T_a", "K", "temperature of the air, which the lubricant has: lubricant.temperature, or the input `ambient`";
         EnergySupply => "energy_supply", "-", "J", "energy given by the source";
         EnergySource => "energy_source", "-", "J", "lost in the source's resistance and limiter";
         EnergyDump => "energy_dump", "-", "J", "lost in the dump resistor";

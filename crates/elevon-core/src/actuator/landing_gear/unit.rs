@@ -2,9 +2,9 @@
 
 use super::layout::Raw;
 use crate::control::pi_rate::{PiRate, PiRateParameter};
-use crate::control::sequence::{BrakeReading, Note, Phase, Places, Seen, Sequence, SequenceParameter, COMMANDS};
-use crate::sensor::proximity::{ProximityParameter, Switches};
-use crate::transmission::brake::{BrakeParameter, Coil, Powered};
+use crate::control::sequence::{BrakeReading, Note, Orders, Phase, Places, Seen, Sequence, SequenceParameter, COMMANDS};
+use crate::sensor::proximity::{ProximityParameter, Scene, Switches};
+use crate::transmission::brake::{BrakeParameter, Coil, Feed, Powered};
 use crate::transmission::lever::LeverParameter;
 use crate::transmission::lock::LockParameter;
 use crate::transmission::planetary::{ReleaseOpen, ReleaseParameter};
@@ -25,6 +25,9 @@ pub struct Unit {
     hall_errors: f64,
     hanging: f64,
     reported: bool,
+    /// Time for which the supply has not carried the unit, and, once it is off, for which it has again.
+    dead: f64,
+    starting: f64,
 }
 
 /// The plant's signals that the unit reads at a tick.
@@ -32,7 +35,7 @@ pub struct Unit {
 pub struct PlantSignals {
     pub time: f64,
     pub command: f64,
-    pub on_wheels: f64,
+    pub on_wheels: bool,
     pub supply: f64,
     pub bus: f64,
     pub speed: f64,
@@ -76,16 +79,10 @@ impl Unit {
         let stroke = raw.lever()[LeverParameter::Stroke as usize];
         let locked = nut - stroke >= raw.lock()[LockParameter::EngageTravel as usize];
         let released = ReleaseOpen::read(raw.release()[ReleaseParameter::Open as usize]) == ReleaseOpen::Yes;
-        let switches = Switches::start(raw.proximity(), nut.min(stroke), locked);
-        let phase = match switches.reading {
-            [_, _, _, true] => Phase::Locked,
-            _ if released => Phase::Released,
-            [true, ..] => Phase::Retracted,
-            _ => Phase::Stopped,
-        };
+        let switches = Switches::start(raw.proximity(), Scene { ram: nut.min(stroke), locked, wheels: false });
         let coil = Coil::new(Powered::read(raw.brake()[BrakeParameter::Powered as usize]) == Powered::Always);
         Self {
-            sequence: Sequence::start(phase, released, places(raw), switches.reading),
+            sequence: Sequence::start(released, places(raw), switches.reading),
             speed: PiRate::default(),
             switches,
             coil,
@@ -98,20 +95,29 @@ impl Unit {
             hall_errors: 0.0,
             hanging: 0.0,
             reported: false,
+            dead: 0.0,
+            starting: 0.0,
         }
     }
 
+    /// The first tick is power-up: what the switches read then, weight on wheels too.
     pub fn tick(&mut self, raw: &[f64], plant: &PlantSignals) {
         let raw = Raw(raw);
         let p = raw.sequence();
         let dt = raw.pi_rate()[PiRateParameter::Period as usize];
-        self.switches.step(raw.proximity(), plant.ram, plant.locked > 0.5, dt);
+        let scene = Scene { ram: plant.ram, locked: plant.locked > 0.5, wheels: plant.on_wheels };
+        if plant.time <= 0.0 {
+            self.switches = Switches::start(raw.proximity(), scene);
+            self.sequence = Sequence::start(self.sequence.released, places(raw), self.switches.reading);
+        } else {
+            self.switches.step(raw.proximity(), scene, dt);
+        }
         let share = dt / (dt + p[SequenceParameter::CurrentFilter as usize]);
         self.current = settled(self.current + (plant.bus - self.current) * share);
         self.line = settled(self.line + (plant.line - self.line) * share);
         self.speed_meas = plant.speed;
         let seen = self.seen(raw, plant, dt);
-        let orders = self.sequence.step(p, &seen);
+        let orders = self.ordered(p, &seen);
         if orders.fresh || !orders.drive {
             self.speed = PiRate::default();
         }
@@ -121,9 +127,29 @@ impl Unit {
         let software = BrakeReading::read(p[SequenceParameter::BrakeReading as usize]) == BrakeReading::SoftwareBrake;
         self.short = orders.short || (software && orders.drive && self.demand.abs() < p[SequenceParameter::BrakeVoltage as usize]);
         let brake = raw.brake();
-        let powered = orders.brake_powered || Powered::read(brake[BrakeParameter::Powered as usize]) == Powered::Always;
-        self.coil.step(powered, brake[BrakeParameter::ReleaseDelay as usize], brake[BrakeParameter::EngageDelay as usize], dt);
+        let always = Powered::read(brake[BrakeParameter::Powered as usize]) == Powered::Always;
+        self.coil.step(brake, Feed { always, powered: orders.brake_powered, supply: plant.supply }, dt);
         self.judge(plant, dt);
+    }
+
+    /// The orders of the state machine while the unit has power: it bridges an interruption, then starts anew.
+    fn ordered(&mut self, p: &[f64], seen: &Seen) -> Orders {
+        let carries = seen.supply >= p[SequenceParameter::LogicVoltage as usize];
+        self.dead = if carries { 0.0 } else { self.dead + seen.dt };
+        if self.sequence.phase == Phase::Off {
+            self.starting = if carries { self.starting + seen.dt } else { 0.0 };
+            if self.starting > p[SequenceParameter::StartTime as usize] * (1.0 - 1e-9) {
+                self.sequence.restart(seen);
+            }
+        } else if self.dead > p[SequenceParameter::HoldUp as usize] * (1.0 + 1e-9) {
+            self.starting = 0.0;
+        } else {
+            return self.sequence.step(p, seen);
+        }
+        if self.sequence.phase == Phase::Off || !carries {
+            self.sequence.lose_power(seen);
+        }
+        Orders::default()
     }
 
     fn seen(&mut self, raw: Raw<'_, f64>, plant: &PlantSignals, dt: f64) -> Seen {
@@ -135,7 +161,6 @@ impl Unit {
             dt,
             time: plant.time,
             command: plant.command.round().clamp(0.0, 2.0 * COMMANDS.len() as f64 - 1.0) as u8,
-            on_wheels: plant.on_wheels > 0.5,
             supply: plant.supply,
             current: self.current,
             line: self.line,

@@ -18,6 +18,7 @@ impl Machine for Rotary {
     const GROUPS: &'static [Group] = layout::GROUPS;
     const PORTS: &'static [Port] = layout::PORTS;
     const LATE_PORTS: &'static [usize] = &[layout::OUTPUT];
+    const HELD_PORTS: &'static [usize] = &[layout::AMBIENT];
 
     fn faults() -> Vec<FaultKind> {
         faults::catalogue(faults::ROTARY)

@@ -100,6 +100,7 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     out.extend(F::check(raw));
     thermal(out, raw);
     drivetrain(out, raw);
+    out.extend(resolver(raw));
     let (fsj, fdj) = (raw[FrictionParameter::Static.at()], raw[FrictionParameter::Dynamic.at()]);
     if fdj > fsj {
         out.push(finding("friction.dynamic", fdj, fsj, format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m")));
@@ -109,6 +110,19 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     if lower >= upper {
         out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}")));
     }
+}
+
+/// Channels whose errors leave no angle that turns with the shaft.
+fn resolver(raw: &[f64]) -> Option<Finding> {
+    let (errors, amplitude) = crate::sensor::resolver::Resolver::derive(Raw(raw).resolver()).eccentricity();
+    (errors >= amplitude).then(|| {
+        let path = "sensor.resolver.sine_offset";
+        let message = format!(
+            "{path}: offsets and quadrature error of the resolver come to {errors:.3}, its weaker channel has {amplitude:.3}: the reported \
+             angle would not turn with the shaft"
+        );
+        finding(path, errors, amplitude, message)
+    })
 }
 
 /// Friction that no motor torque overcomes, balls that do not fit.
@@ -165,12 +179,15 @@ fn thermal(out: &mut Vec<Finding>, raw: &[f64]) {
 pub fn faulted_high<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let mut out = F::check(raw);
     steps::<F>(&mut out, raw);
+    out.extend(resolver(raw));
     out
 }
 
 /// The same for the reduced-order model, whose steps are exact or implicit.
 pub fn faulted_low<F: Form>(raw: &[f64]) -> Vec<Finding> {
-    F::check(raw)
+    let mut out = F::check(raw);
+    out.extend(resolver(raw));
+    out
 }
 
 fn whole_multiple(out: &mut Vec<Finding>, raw: &[f64], index: usize, path: &str) {

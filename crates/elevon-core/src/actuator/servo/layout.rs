@@ -24,7 +24,10 @@ use crate::transmission::bearing::{BearingParameter, BEARING};
 use crate::transmission::friction::{FrictionParameter, FRICTION};
 use crate::transmission::friction_law::{FrictionLawParameter, FRICTION_LAW};
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter, GEAR, LOAD, STOP};
+use crate::transmission::lubricant::{LubricantParameter, LUBRICANT};
 use crate::transmission::tooth::{ToothParameter, TOOTH};
+use crate::variable::acts::{when, When};
+use crate::variable::{relabelled, Relabel, Variable};
 use crate::{choices, groups, variables};
 
 choices! {
@@ -46,6 +49,7 @@ variables! {
                 Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
                 Away("sensor.resolver.sine_short", 0.0), Away("sensor.resolver.cosine_short", 0.0), Away("sensor.resolver.excitation_short", 0.0),
                 Away("sensor.resolver.sine_open", 0.0), Away("sensor.resolver.cosine_open", 0.0), Away("sensor.resolver.stuck", 0.0),
+                Away("sensor.resolver.quadrature", 0.0), Away("sensor.resolver.sine_offset", 0.0), Away("sensor.resolver.cosine_offset", 0.0),
                 Away("sensor.resolver.noise_deviation", 0.0),
             ])]);
         FeedbackLoss => "feedback_loss", "-", "1", Choice(FeedbackLoss::NAMES), Controller, Some(0.0), "without resolver power the drive runs on with the last reading, or opens its bridge until it returns",
@@ -66,6 +70,27 @@ variables! {
         FaultGrid => "fault_grid", "-", "s", Between(1e-12, 1e6), Solver, Some(1e-3), "smooth fault profiles are held over this time";
     }
 }
+
+/// Which friction there is for the temperature of motor and transmission to change.
+const GREASE: [Variable; LUBRICANT.len()] = relabelled(
+    LUBRICANT,
+    &[
+        Relabel::acts(LubricantParameter::ViscosityRate as usize, when(&[When::Away("friction.viscous", 0.0)])),
+        Relabel::acts(
+            LubricantParameter::ViscosityExponent as usize,
+            when(&[When::Away("lubricant.viscosity_rate", 0.0), When::Away("friction.viscous", 0.0)]),
+        ),
+        Relabel::acts(
+            LubricantParameter::LossRate as usize,
+            when(&[When::Either(&[
+                When::Away("gear.efficiency", 1.0),
+                When::Away("gear.efficiency_aiding", 1.0),
+                When::Away("screw.efficiency", 1.0),
+                When::Away("screw.efficiency_aiding", 1.0),
+            ])]),
+        ),
+    ],
+);
 
 groups! {
     motor: "motor", MOTOR, MotorParameter;
@@ -98,6 +123,7 @@ groups! {
     switching: "inverter", SWITCHING, SwitchingParameter;
     drive_heat: "thermal", DRIVE_HEAT, DriveHeatParameter;
     rub: "motor", RUB, RubParameter;
+    lubricant: "lubricant", &GREASE, LubricantParameter;
 }
 
 pub const PORTS: &[Port] = &[
@@ -111,6 +137,7 @@ pub const PORTS: &[Port] = &[
     Port { name: "shaft", unit: "N m", text: "signed torque on the motor shaft, positive opposes positive motion", parameter: "" },
     Port { name: "output", unit: "N m", text: "signed torque on the output side, positive opposes positive motion", parameter: "" },
     Port { name: "supply", unit: "V", text: "DC link voltage", parameter: "inverter.supply_voltage" },
+    Port { name: "ambient", unit: "K", text: "temperature of the air, held over 10 ms", parameter: "thermal.ambient" },
 ];
 
 pub const COMMAND: usize = 0;
@@ -118,3 +145,4 @@ pub const BRAKE: usize = 1;
 pub const SHAFT: usize = 2;
 pub const OUTPUT: usize = 3;
 pub const SUPPLY: usize = 4;
+pub const AMBIENT: usize = 5;

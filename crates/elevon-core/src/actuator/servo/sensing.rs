@@ -24,6 +24,8 @@ details! {
         noisy = Resolver::<f64>::noisy(&parts.resolver());
         /// The encoder loses counts, or stands still: it has a counter to follow.
         counting = Encoder::<f64>::loses(&parts.encoder());
+        /// The interpolation of the encoder errs.
+        interpolated = Encoder::<f64>::errs(&parts.encoder());
     }
     extra {
         /// The commutation has a track of its own.
@@ -60,7 +62,7 @@ pub struct Sensed<S> {
 impl<S: Scalar> Sensing<S> {
     pub(super) fn derive(raw: &[S], d: &SensingDetails) -> Self {
         let turn = if d.linear { 1.0 } else { std::f64::consts::TAU };
-        Self { encoder: Encoder::derive(Raw(raw).encoder(), turn), resolver: Resolver::derive(Raw(raw).resolver()) }
+        Self { encoder: Encoder::derive(Raw(raw).encoder(), turn, d.linear), resolver: Resolver::derive(Raw(raw).resolver()) }
     }
 
     /// As the reduced-order model has them.
@@ -70,13 +72,18 @@ impl<S: Scalar> Sensing<S> {
 
     pub(super) fn start(&self, s: &ShaftState<S>) -> Sensed<S> {
         let resolver = ResolverState { angle: s.motor_position, speed: s.motor_speed };
-        Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(s.output_position) }
+        Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(self.encoder.interpolated(s.output_position)) }
     }
 
     /// The resolver has no power or no signal.
     #[inline(always)]
     pub(super) fn lost(&self) -> S::Mask {
         S::splat(0.5).lt(self.resolver.off)
+    }
+
+    /// How far the resolver is from the shaft, as long as it has power.
+    pub(super) fn errors(&self) -> S {
+        self.resolver.errors()
     }
 
     /// Change of the reported speed over that of the shaft's.
@@ -108,11 +115,12 @@ impl<S: Scalar> Sensing<S> {
     /// Position of the encoder, which counts on to the present.
     #[inline(always)]
     pub(super) fn count<const FULL: bool>(&self, d: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) -> S {
+        let output = if FULL && d.interpolated { self.encoder.interpolated(s.output_position) } else { s.output_position };
         if FULL && d.counting {
-            self.encoder.advance(s.output_position, &mut sensed.encoder);
+            self.encoder.advance(output, &mut sensed.encoder);
             sensed.encoder.reading
         } else {
-            self.encoder.read(s.output_position)
+            self.encoder.read(output)
         }
     }
 

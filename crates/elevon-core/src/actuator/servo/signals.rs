@@ -46,10 +46,12 @@ signals! {
         TransmissionTorque => "transmission_torque", "T_t", "N m", "torque through the backlash at the output (elastic model)", LoadCell;
         SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage", SupplyVoltage;
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
+        WindingTemperatureHottest => "winding_temperature_hottest", "-", "K", "temperature of the hottest phase (thermal network): at standstill up to twice the winding's rise over the surface";
         SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface", SurfaceTemperature;
         HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
         HeatLoop => "heat_loop", "-", "W", "copper heat of shorted turns, mean of the network's last tick";
         HeatContact => "heat_contact", "-", "W", "heat of contacts in the windings, mean of the network's last tick";
+        HeatPhaseHottest => "heat_phase_hottest", "-", "W", "heat of the phase that has most, mean of the network's last tick";
         HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
         ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
         Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
@@ -84,6 +86,7 @@ signals! {
         DriveTemperature => "drive_temperature", "T_d", "K", "temperature of the drive, warmed by the inverter's losses (thermal network)", DriveTemperature;
         HeatDrive => "heat_drive", "-", "W", "losses of the inverter, mean of the network's last tick";
         StopTorque => "stop_torque", "-", "N m", "torque on the motor shaft that the end stop's reaction cancels";
+        AmbientTemperature => "ambient_temperature", "T_a", "K", "temperature of the air: thermal.ambient, or the input `ambient`";
     }
 }
 
@@ -108,8 +111,10 @@ signals! {
         LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the motor shaft";
         SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage", SupplyVoltage;
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
+        WindingTemperatureHottest => "winding_temperature_hottest", "-", "K", "temperature of the hottest phase (thermal network): at standstill up to twice the winding's rise over the surface";
         SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface", SurfaceTemperature;
         HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
+        HeatPhaseHottest => "heat_phase_hottest", "-", "W", "heat of the phase that has most, mean of the network's last tick";
         HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
         ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
         Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
@@ -122,6 +127,7 @@ signals! {
         EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
         EnergyAir => "energy_air", "-", "J", "heat given to the air";
         StopTorque => "stop_torque", "-", "N m", "torque on the motor shaft that the end stop's reaction cancels";
+        AmbientTemperature => "ambient_temperature", "T_a", "K", "temperature of the air: thermal.ambient, or the input `ambient`";
     }
 }
 

@@ -13,6 +13,10 @@ pub const FAULTS: &[&str] = &[
     "proximity",
     "the drive tripped",
     "uncommanded motion",
+    "the supply left its limits in motion",
+    "weight on wheels in retraction",
+    "no current in the motor",
+    "the control unit lost its power",
 ];
 pub const MOTION: u8 = 1;
 pub const NOT_RELEASED: u8 = 2;
@@ -24,6 +28,10 @@ pub const HALL: u8 = 7;
 pub const PROXIMITY: u8 = 8;
 pub const TRIPPED: u8 = 9;
 pub const UNCOMMANDED: u8 = 10;
+pub const SUPPLY: u8 = 11;
+pub const WHEELS_DOWN: u8 = 12;
+pub const NO_CURRENT: u8 = 13;
+pub const POWER: u8 = 14;
 
 pub const COMMANDS: &[&str] = &["stop", "extend", "retract", "free_fall"];
 pub const STOP: u8 = 0;
@@ -51,5 +59,19 @@ pub const LOCK_ENGAGED: u8 = 6;
 pub const REPEATED: u8 = 7;
 
 /// What the unit warns of without stopping.
-pub const WARNINGS: &[&str] = &["none", "the motor works against a drag"];
+pub const WARNINGS: &[&str] = &[
+    "none",
+    "the motor works against a drag",
+    "the switch at 0 % fails",
+    "the switch at 25 % fails",
+    "the switch at 75 % fails",
+    "the switch on the lock sleeve fails",
+    "the weight-on-wheels switch fails",
+    "the Hall sensors' power is interrupted",
+    "the switches contradict each other",
+];
 pub const DRAG: u8 = 1;
+/// Of the first switch; the others follow.
+pub const SWITCH: u8 = 2;
+pub const HALL_POWER: u8 = 7;
+pub const CONTRADICTION: u8 = 8;

@@ -12,11 +12,13 @@ pub enum Note {
         reason: u8,
         value: f64,
     },
-    /// The unit went to its fault state; the command it was carrying out (stop: it was at rest).
+    /// The unit went to its fault state; the command it was carrying out (stop: it was at rest), and the warning that
+    /// names a switch.
     Failed {
         time: f64,
         fault: u8,
         command: u8,
+        warning: u8,
     },
     /// The ram rests short of its lock after the release.
     Hanging {
@@ -56,11 +58,14 @@ impl Note {
                 let voltage = if matches!(*reason, SUPPLY_LOW | SUPPLY_HIGH) { format!(" ({value:.1} V)") } else { String::new() };
                 format!("{} refused at {time:.2} s: {}{voltage}", name(command), REFUSALS[usize::from(*reason)])
             }
-            Note::Failed { time, fault, command: STOP } => {
-                format!("fault of the control unit at rest at {time:.2} s: {}", FAULTS[usize::from(*fault)])
-            }
-            Note::Failed { time, fault, command } => {
-                format!("{} did not arrive, fault of the control unit at {time:.2} s: {}", name(command), FAULTS[usize::from(*fault)])
+            Note::Failed { time, fault, command, warning } => {
+                let switch =
+                    if *fault == PROXIMITY && (SWITCH..HALL_POWER).contains(warning) { WARNINGS[usize::from(*warning)] } else { "" };
+                let cause = if switch.is_empty() { FAULTS[usize::from(*fault)] } else { switch };
+                match *command {
+                    STOP => format!("fault of the control unit at rest at {time:.2} s: {cause}"),
+                    _ => format!("{} did not arrive, fault of the control unit at {time:.2} s: {cause}", name(command)),
+                }
             }
             Note::Hanging { time, place } => format!("free_fall did not lock: the ram rests at {:.1} mm at {time:.2} s", 1e3 * place),
         }
@@ -101,9 +106,9 @@ impl Sequence {
 
     fn refusal(&self, p: &[f64], see: &Seen, command: u8) -> Option<(u8, f64)> {
         if command == FREE_FALL {
-            return if self.phase == Phase::Locked { Some((LOCK_ENGAGED, 1.0)) } else { see.on_wheels.then_some((ON_WHEELS, 1.0)) };
+            return self.fall_refusal();
         }
-        if self.released || self.releasing > 0.0 {
+        if self.apart() {
             return Some((RELEASED_ALREADY, 1.0));
         }
         if self.phase == Phase::Fault && !self.cleared {
@@ -115,6 +120,12 @@ impl Sequence {
         if see.supply > p[P::Overvoltage as usize] {
             return Some((SUPPLY_HIGH, see.supply));
         }
-        (command == RETRACT && see.on_wheels).then_some((ON_WHEELS, 1.0))
+        (command == RETRACT && self.on_wheels(p)).then_some((ON_WHEELS, 1.0))
+    }
+
+    /// An emergency command is refused for a lock alone, which its switch shows and a motion has confirmed. Weight on wheels
+    /// has no second indication: the place of the leg says nothing of the ground.
+    fn fall_refusal(&self) -> Option<(u8, f64)> {
+        (self.phase == Phase::Locked).then_some((LOCK_ENGAGED, 1.0))
     }
 }

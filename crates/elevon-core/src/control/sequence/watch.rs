@@ -1,8 +1,8 @@
-//! What the control unit watches: the switches against each other and against the Hall count, the motor, rest, the fall.
+//! What the control unit watches in motion: the switches against each other and against the Hall count, motor, supply.
 
 use super::codes::*;
 use super::command::Note;
-use super::position::Margins;
+use super::readings::{P100, SWITCHES};
 use super::{Move, Phase, Seen, Sequence, SequenceParameter as P};
 
 impl Sequence {
@@ -10,23 +10,31 @@ impl Sequence {
     pub(super) fn fail(&mut self, see: &Seen, fault: u8) {
         self.note(see, fault);
         self.phase = Phase::Fault;
-        self.action = Move::Idle;
         self.following = None;
         self.wanted = STOP;
         self.cleared = false;
+        self.stop_now();
     }
 
-    fn note(&mut self, see: &Seen, fault: u8) {
+    pub(super) fn note(&mut self, see: &Seen, fault: u8) {
         if self.fault != fault {
             self.fault = fault;
-            self.notes.add(Note::Failed { time: see.time, fault, command: self.wanted });
+            self.warn();
+            self.notes.add(Note::Failed { time: see.time, fault, command: self.wanted, warning: self.warning });
         }
     }
 
-    /// Stops, rests, then goes on with `following`, unless all retries are spent.
+    /// Nothing follows from a switch any more.
+    pub(super) fn flag(&mut self, switch: usize) {
+        self.readings.failed[switch] = true;
+    }
+
+    /// Stops, rests, then goes on with `following`, unless all retries are spent. Without current no lock and no jam is
+    /// the cause.
     fn retry(&mut self, p: &[f64], see: &Seen, following: Move, fault: u8) {
         if self.retries >= p[P::Retries as usize] {
-            return self.fail(see, fault);
+            let dead = self.stalled(p) && see.line.abs() < p[P::OpenCurrent as usize];
+            return self.fail(see, if dead { NO_CURRENT } else { fault });
         }
         self.retries += 1.0;
         self.pause = p[P::RetryPause as usize];
@@ -35,101 +43,84 @@ impl Sequence {
     }
 
     pub(super) fn watch(&mut self, p: &[f64], see: &Seen) {
-        let switches_fail = self.switches_fail(p, see);
-        self.narrow(p, see);
-        if self.released || self.releasing > 0.0 {
-            return self.watch_fall(p, see, switches_fail);
+        if self.apart() {
+            return self.watch_fall(p, see);
         }
+        let proven = self.judge_switches(p, see);
+        self.warn();
         if self.phase == Phase::Fault {
-            return;
+            return self.watch_rest(p, see);
         }
+        let upwards = matches!(self.action, Move::Retract | Move::BackOff) || (self.action == Move::Confirm && !self.extending);
         if see.tripped {
             self.fail(see, TRIPPED);
         } else if self.hall_fails(p, see) {
             self.fail(see, HALL);
-        } else if switches_fail {
+        } else if upwards && self.on_wheels(p) {
+            self.fail(see, WHEELS_DOWN);
+        } else if proven && upwards && self.action != Move::Confirm {
             self.fail(see, PROXIMITY);
         } else if see.speed.abs() > p[P::Overspeed as usize] {
             self.fail(see, OVERSPEED);
         } else if see.current > p[P::Overcurrent as usize] {
             self.fail(see, OVERCURRENT);
         } else if self.action == Move::Idle {
-            self.watch_idle(p, see);
+            self.watch_rest(p, see);
+        } else if self.starves(p, see) {
+            self.fail(see, SUPPLY);
+        } else if self.action == Move::Confirm {
+            self.watch_press(p, see, proven);
         } else if self.action != Move::Halt {
             self.watch_move(p, see);
         }
     }
 
-    /// The leg falls without the motor: nothing is left to stop, only the switches report.
-    fn watch_fall(&mut self, p: &[f64], see: &Seen, switches_fail: bool) {
-        let lost_lock = self.phase == Phase::Locked && !see.switches[3];
-        if lost_lock {
-            self.phase = Phase::Released;
-        }
-        if switches_fail || lost_lock {
-            self.note(see, PROXIMITY);
-        }
-        self.falling += see.dt;
-        if self.phase == Phase::Released && self.falling > p[P::FallTime as usize] {
-            self.note(see, NOT_ENGAGED);
-        }
+    /// Outside the limits of the supply for longer than its transients.
+    fn starves(&mut self, p: &[f64], see: &Seen) -> bool {
+        let outside = see.supply < p[P::Undervoltage as usize] || see.supply > p[P::Overvoltage as usize];
+        self.starved = if outside { self.starved + see.dt } else { 0.0 };
+        self.starved > p[P::SupplyTime as usize]
     }
 
-    /// At rest the count stands still, and the switch of the end stays on. The count is zeroed at the ends.
-    fn watch_idle(&mut self, p: &[f64], see: &Seen) {
-        let settled = self.resting >= p[P::RestTime as usize];
-        if self.resting == 0.0 {
-            self.arrived = see.counted;
-        }
-        self.resting += see.dt;
-        if !settled {
-            self.anchor = see.counted;
-            if self.resting >= p[P::RestTime as usize] {
-                self.zero();
-            }
-        }
-        let left = match self.phase {
-            Phase::Retracted => !see.switches[0],
-            Phase::Locked => !see.switches[3],
-            _ => false,
-        };
-        self.gone = if left { self.gone + see.dt } else { 0.0 };
-        let moved = |from: f64| (see.counted - from).abs() > p[P::RestTravel as usize];
-        if moved(self.anchor) {
-            self.fail(see, UNCOMMANDED);
-        } else if self.gone > p[P::ProximityTime as usize] {
-            self.fail(see, if moved(self.arrived) { UNCOMMANDED } else { PROXIMITY });
-        }
-    }
-
-    fn zero(&mut self) {
-        let places = self.places;
-        match self.phase {
-            Phase::Retracted => self.position.between(0.0, places.switch[0] + places.hysteresis),
-            Phase::Locked => self.position.between(places.stroke + places.release, places.stroke + places.end),
-            _ => {}
+    /// Against a stop the motor stands under a current that no free leg needs.
+    fn watch_press(&mut self, p: &[f64], see: &Seen, proven: bool) {
+        let (line, limit) =
+            if self.extending { (see.line, p[P::DragExtension as usize]) } else { (-see.line, p[P::DragRetraction as usize]) };
+        let stands = see.speed.abs() < p[P::StallSpeed as usize] && line > limit;
+        self.pressing = if stands { self.pressing + see.dt } else { 0.0 };
+        if proven {
+            self.finish(Phase::Stopped);
         }
     }
 
     fn watch_move(&mut self, p: &[f64], see: &Seen) {
         let stands = see.speed.abs() < p[P::StallSpeed as usize] && see.demand.abs() > p[P::StallVoltage as usize];
         self.standing = if stands { self.standing + see.dt } else { 0.0 };
-        let slow = self.action == Move::Extend && see.switches[2];
+        let slow = self.action == Move::Extend && self.last_quarter();
         self.slow = if slow { self.slow + see.dt } else { 0.0 };
         self.watch_drag(p, see);
         let stalled = self.stalled(p) || self.driven_back(p, see);
         let near = self.position.high > self.places.stroke - 2e-3;
-        if self.action == Move::Retract && see.switches[3] && (stalled || self.since > p[P::UnlockTimeout as usize]) {
+        let known = self.position.high - self.position.low <= p[P::ProximityTravel as usize];
+        let late = known && self.slow > p[P::LockTimeout as usize];
+        if self.action == Move::Retract && self.readings.believed(P100) && (stalled || self.since > p[P::UnlockTimeout as usize]) {
             self.retry(p, see, Move::Reseat, NOT_RELEASED);
-        } else if self.locked_at_the_stop(p, see) {
-            // The end of the stroke itself confirms the lock's switch: `act` takes it.
-        } else if self.action == Move::Extend && (self.slow > p[P::LockTimeout as usize] || (stalled && near)) {
+        } else if self.locked_at_the_stop(p) || self.retracted_at_the_stop(p) {
+            // The end of the stroke itself confirms the switch: `act` takes it.
+        } else if self.action == Move::Extend && (stalled || late) && self.may_be_locked() {
+            self.rest_unconfirmed(see, if self.readings.failed[P100] { PROXIMITY } else { NOT_ENGAGED });
+        } else if self.action == Move::Extend && (late || (stalled && near)) {
             self.retry(p, see, Move::BackOff, NOT_ENGAGED);
         } else if stalled && self.action != Move::Reseat {
             self.retry(p, see, self.action, STALLED);
         } else if self.since > p[P::MotionTimeout as usize] {
             self.retry(p, see, self.action, MOTION);
         }
+    }
+
+    /// As far as the count goes: then a motion upwards could unlock it, whatever its switch reads.
+    fn may_be_locked(&self) -> bool {
+        self.position.high >= self.places.stroke + self.places.engage
     }
 
     pub(super) fn stalled(&self, p: &[f64]) -> bool {
@@ -152,6 +143,20 @@ impl Sequence {
         if self.dragging > p[P::DragTime as usize] {
             self.warning = DRAG;
         }
+        if see.hall_errors - self.hall_begun >= p[P::HallErrors as usize] && self.warning == 0 {
+            self.warning = HALL_POWER;
+        }
+    }
+
+    /// A switch at fault is displayed where nothing else is, and readings of which one must be.
+    fn warn(&mut self) {
+        if self.warning == 0 || self.warning == CONTRADICTION {
+            if let Some(first) = (0..SWITCHES).find(|&j| self.readings.failed[j]) {
+                self.warning = SWITCH + first as u8;
+            } else if self.doubt {
+                self.warning = CONTRADICTION;
+            }
+        }
     }
 
     fn hall_fails(&mut self, p: &[f64], see: &Seen) -> bool {
@@ -167,17 +172,24 @@ impl Sequence {
         see.time - self.hall_times[needed.clamp(1, 8) - 1] < window || self.hall_invalid > window
     }
 
-    /// Pairs that no position of the ram has, and switches that the count contradicts.
-    fn switches_fail(&mut self, p: &[f64], see: &Seen) -> bool {
-        let [at_0, at_25, at_75, lock] = see.switches;
-        let pair = (lock && !at_75) || (at_75 && !at_25) || (at_25 && at_0);
-        let margins = Margins { end: p[P::CountTolerance as usize], quarter: p[P::ProximityTravel as usize] };
-        let contradicted = self.position.contradicted(&self.places, see.switches, &margins);
-        let fails = pair || contradicted.is_some();
-        self.impossible = if fails { self.impossible + see.dt } else { 0.0 };
+    /// Flags a switch that the count contradicts, or that has read the same over too much travel. True where readings
+    /// cannot all be right. Where two switches stand against the count, the count is what is wrong.
+    fn judge_switches(&mut self, p: &[f64], see: &Seen) -> bool {
+        let limits = self.limits(p);
+        let proven = self
+            .position
+            .contradicted(&self.places, &self.readings.on, &self.readings.failed, &Self::margins(p))
+            .or_else(|| self.readings.overstayed(&self.places, &limits));
+        let pair = self.readings.pair();
+        self.impossible = if proven.is_some() || pair.is_some() { self.impossible + see.dt } else { 0.0 };
         let failed = self.impossible > p[P::ProximityTime as usize];
-        if failed && lock && (!at_75 || at_0 || contradicted == Some(3)) {
-            self.distrusted = true;
+        self.doubt = failed && proven.is_none();
+        if let (true, Some(switch)) = (failed, proven) {
+            if (0..4).any(|j| self.readings.failed[j]) {
+                self.position = super::Position::start(&self.places, self.readings.on, see.counted);
+            }
+            self.flag(switch);
+            self.impossible = 0.0;
         }
         failed
     }

@@ -63,7 +63,7 @@ impl<S: Scalar> Bridge<S> {
         let closed = three!(|j| {
             let (conduction, after) = pulses.legs[j].conduction(pulses.before[j], s.blanking[j], dead);
             left[j] = after;
-            let share = pulses.legs[j].share();
+            let share = pulses.legs[j].share;
             let idle = current[j].equals(zero);
             let upper = S::select(idle, share, conduction.upper);
             let lower = S::select(idle, one - share, conduction.lower);

@@ -54,6 +54,8 @@ pub struct Account<S> {
     pub loops: S,
     pub contact: S,
     pub tap: S,
+    /// Copper of each phase.
+    pub phases: [S; 3],
 }
 
 /// A floating leg carries less than this by rounding alone, A.
@@ -275,7 +277,15 @@ impl<'a, S: Scalar> Network<'a, S> {
         let change = (new[0] - old[0]) + (new[1] - old[1]) + (new[2] - old[2]);
         let per = S::one() / (conducts[0] + conducts[1] + conducts[2]);
         let step = Step { phase: three!(|j| v[j] - neutral), neutral, factor, change, per };
-        let mut out = Account { legs: old, ground: S::zero(), copper: S::zero(), loops: S::zero(), contact: S::zero(), tap: S::zero() };
+        let mut out = Account {
+            legs: old,
+            ground: S::zero(),
+            copper: S::zero(),
+            loops: S::zero(),
+            contact: S::zero(),
+            tap: S::zero(),
+            phases: [S::zero(); 3],
+        };
         let mut excess = S::zero();
         for kind in 0..KINDS {
             if self.structure[kind] {
@@ -289,6 +299,7 @@ impl<'a, S: Scalar> Network<'a, S> {
         let dt = self.shorts.dt;
         let copper = three!(|j| dt * resistance[j] * middle[j] * middle[j]);
         out.copper = out.copper + (copper[0] + copper[1] + copper[2]);
+        out.phases = three!(|j| out.phases[j] + copper[j]);
         if self.structure[LOOP] {
             let inside = self.shorts.loops(&self.structure, middle, &through);
             for j in 0..3 {
@@ -314,6 +325,7 @@ impl<'a, S: Scalar> Network<'a, S> {
         } else {
             out.contact = out.contact + contact;
             out.copper = out.copper + (heat - contact);
+            out.phases[j] = out.phases[j] + (heat - contact);
         }
         if kind == GROUND {
             out.ground = out.ground + mean;

@@ -12,7 +12,7 @@ use crate::transmission::brake::Brake;
 use crate::transmission::friction::Friction;
 use crate::transmission::lever::{Arm, LegParameter, Lever};
 use crate::transmission::lock::Lock;
-use crate::transmission::lubricant::Lubricant;
+use crate::transmission::lubricant::Grease;
 use crate::transmission::planetary::{Governor, Planetary, PlanetaryParameter};
 use crate::transmission::roller_screw::{RollerScrew, ScrewParameter};
 use crate::transmission::train_friction::TrainFriction;
@@ -128,7 +128,7 @@ impl<S: Scalar> Mechanics<S> {
     pub fn derive(raw: &[S], dt: S) -> Self {
         let view = Raw(raw);
         let at = |i: usize| raw[i];
-        let lubricant = Lubricant::derive(view.lubricant());
+        let lubricant = Grease::derive(view.lubricant()).at(at(LubricantStateParameter::Temperature.at()));
         let screw = RollerScrew::derive(view.screw(), &lubricant);
         let gear = Planetary::derive(view.gear(), &lubricant);
         let lever = Lever::derive(view.lever());

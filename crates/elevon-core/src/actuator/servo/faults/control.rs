@@ -19,6 +19,14 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             ..attribute("position", "rad", "sensor.encoder.dark_position", "angle of the disc at the middle of a dark sector")
         },
     ];
+    const FIRST: &[Attribute] = &[Attribute {
+        default: Some(0.0),
+        ..attribute("phase", "rad", "sensor.encoder.first_phase", "phase of the error where the output stands at zero")
+    }];
+    const SECOND: &[Attribute] = &[Attribute {
+        default: Some(0.0),
+        ..attribute("phase", "rad", "sensor.encoder.second_phase", "phase of the error where the output stands at zero")
+    }];
     vec![
         FaultKind {
             kind: "gain_drift",
@@ -46,6 +54,24 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.mismatch" Add),
             effect: "amplitude lost by one resolver channel: atan2(g sin, cos), an angle error at twice the shaft frequency",
             source: "N 4.5",
+        },
+        FaultKind {
+            kind: "quadrature",
+            unit: "rad",
+            range: Range::Between(-0.3, 0.3),
+            attributes: &[],
+            places: places!("sensor.resolver": "sensor.resolver.quadrature" Add),
+            effect: "angle by which the resolver's windings deviate from their right angle: an angle error of half of it, in the mean and at twice the shaft frequency",
+            source: "closed form of the converter's arctangent; that it comes as a fault ASSUMED (deformed or displaced windings)",
+        },
+        FaultKind {
+            kind: "channel_offset",
+            unit: "1",
+            range: Range::Between(-0.2, 0.2),
+            attributes: &[],
+            places: places!("sensor.resolver.sine": "sensor.resolver.sine_offset" Add, "sensor.resolver.cosine": "sensor.resolver.cosine_offset" Add),
+            effect: "offset of a demodulated resolver channel over its healthy amplitude: an angle error of as many rad once a turn of the shaft",
+            source: "closed form of the converter's arctangent; that it comes as a fault ASSUMED (drift of the converter's electronics)",
         },
         FaultKind {
             kind: "offset",
@@ -91,6 +117,24 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder": "sensor.encoder.dark_share" Add),
             effect: "share of the encoder's disc that gives no counts: the reported position stands in a dark sector, and what was lost stays lost until the disc turns back through it or the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5 (sectors of the disc)",
+        },
+        FaultKind {
+            kind: "interpolation",
+            unit: "1",
+            range: Range::Between(0.0, 0.5),
+            attributes: FIRST,
+            places: places!("sensor.encoder.first": "sensor.encoder.first_harmonic" Add),
+            effect: "interpolation error once a period of the encoder's pulses, over that period (offsets of its signals); the position loop feels it where control.position_feedback = encoder",
+            source: "closed form of two signals with offsets; that it comes as a fault ASSUMED (dirt, drift of the electronics)",
+        },
+        FaultKind {
+            kind: "interpolation",
+            unit: "1",
+            range: Range::Between(0.0, 0.5),
+            attributes: SECOND,
+            places: places!("sensor.encoder.second": "sensor.encoder.second_harmonic" Add),
+            effect: "interpolation error twice a period of the encoder's pulses, over that period (unequal amplitudes or a phase error of its signals); the position loop feels it where control.position_feedback = encoder",
+            source: "closed form of two unlike signals; that it comes as a fault ASSUMED (tilt or distance of the reading head)",
         },
         FaultKind {
             kind: "resolver_short",

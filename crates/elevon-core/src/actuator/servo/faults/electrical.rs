@@ -7,7 +7,12 @@ use crate::variable::Range;
 
 /// Faults of a star motor and its inverter.
 pub fn electrical() -> Vec<FaultKind> {
-    const PHASE: &[Attribute] = &[attribute("phase", "rad", "motor.eccentricity_static_phase", "electrical phase angle of the narrow gap")];
+    const PHASE: &[Attribute] = &[attribute(
+        "phase",
+        "rad",
+        "motor.eccentricity_static_phase",
+        "phase angle of the narrow gap: electrical in the published law, round the stator in the periodic one",
+    )];
     const PHASE_DYNAMIC: &[Attribute] =
         &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
     const REFERENCE: &[Attribute] = &[Attribute {
@@ -56,13 +61,13 @@ pub fn electrical() -> Vec<FaultKind> {
         FaultKind {
             kind: "eccentricity_static", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE,
             places: places!("motor": "motor.eccentricity_static" Add),
-            effect: "fraction of the air gap by which the rotor stands out of centre, at rest: k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)), torque ripple at the electrical frequency",
-            source: "T2 (eccentricity coefficient zeta, phi)",
+            effect: "fraction of the air gap by which the rotor stands out of centre, at rest; motor.eccentricity_law = published: k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)), torque ripple at the electrical frequency and an EMF with a mean over a turn; periodic: k_j (1 + zeta cos(phi - 2 pi (j-1)/3)), unequal amplitudes, torque ripple at twice the electrical frequency",
+            source: "T2 (eccentricity coefficient zeta, phi); periodic law ASSUMED: a phase's coils stand together",
         },
         FaultKind {
             kind: "eccentricity_dynamic", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
-            effect: "fraction of the air gap by which the rotor stands out of centre, turning with the shaft: the modulation of k_j turns, too (law ASSUMED: the paper names the fault only)",
+            effect: "fraction of the air gap by which the rotor stands out of centre, turning with the shaft: the modulation of k_j turns, too, or that of the flux (motor.eccentricity_law; both ASSUMED: the paper names the fault only)",
             source: "N 4.4 and 5.1",
         },
         FaultKind {

@@ -4,7 +4,7 @@
 //! (on the straight line between the errors at both ends, exact to the order of the step), the relay turns, and the rest
 //! follows, in which another relay may cross in turn.
 
-use super::electric::{electric_step, Coupling, Detailed, Gates};
+use super::electric::{electric_step, Coupling, Detailed};
 use super::model::{Model, State};
 use super::shorted::discrete;
 use super::step::{lose_switching, measured_current};
@@ -164,7 +164,7 @@ impl<S: Scalar> Switched<'_, S> {
         let model = self.model.over(share);
         s.star.current = start;
         if !FULL {
-            return electric_step::<S, false, false>(&model, self.structure, s, self.coupling, self.half_supply, Gates::At(old_legs));
+            return electric_step::<S, false, false>(&model, self.structure, s, self.coupling, self.half_supply, old_legs);
         }
         if self.structure.shorted {
             s.extra.contacts = discrete(&model, &s.star);
@@ -212,7 +212,7 @@ fn choose<S: Scalar>(s: &mut State<S>, split: S::Mask, kept: &State<S>) {
     for (mine, other) in s.energy.iter_mut().zip(kept.energy) {
         *mine = pick(*mine, other);
     }
-    for (mine, other) in s.extra.network.collected.iter_mut().zip(kept.extra.network.collected) {
-        *mine = pick(*mine, other);
-    }
+    let (heat, other) = (&mut s.extra.network, &kept.extra.network);
+    heat.collected = three!(|j| pick(heat.collected[j], other.collected[j]));
+    heat.windings = three!(|j| pick(heat.windings[j], other.windings[j]));
 }

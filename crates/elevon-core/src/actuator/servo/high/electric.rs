@@ -4,7 +4,7 @@ use super::model::*;
 use super::shorted::shorted_step;
 use crate::actuator::servo::details::Structure;
 use crate::inverter::bridge::{extinguish, BridgeState, Circuit, Connection, Pulses, Windings};
-use crate::scalar::{three_phase, Kernel, Scalar};
+use crate::scalar::{Kernel, Scalar};
 use crate::three;
 
 /// Electromagnetic coefficients of the present rotor angle.
@@ -28,32 +28,8 @@ pub(crate) fn coupling_at<S: Scalar, const FULL: bool>(
     position: S,
     [sin, cos]: [S; 2],
 ) -> Coupling<S> {
-    let (mut shape, _) = three_phase(sin, cos);
-    let eccentric = structure.motor.static_eccentricity;
-    if !FULL && !eccentric {
-        return Coupling { k: m.star.even_coefficients(shape) };
-    }
-    let mut gap = [S::one(); 3];
-    if eccentric {
-        gap = m.star.static_gap(sin, cos);
-    }
-    if FULL {
-        if structure.motor.trapezoidal {
-            shape = m.star.trapezoid(m.star.electrical_angle(position));
-        }
-        if structure.motor.dynamic_eccentricity {
-            let turning = m.star.dynamic_gap(position);
-            gap = three!(|j| gap[j] * turning[j]);
-        }
-        if structure.motor.weak_pole {
-            let passing = m.extra.pole.gap(position);
-            gap = three!(|j| gap[j] * passing[j]);
-        }
-        if structure.thermal {
-            gap = three!(|j| gap[j] * s.star.flux_factor);
-        }
-    }
-    Coupling { k: m.star.coefficients(shape, gap) }
+    let flux = structure.thermal.then_some(s.star.flux_factor);
+    Coupling { k: m.star.coefficients::<FULL>(&structure.motor, Some(&m.extra.pole), position, [sin, cos], flux) }
 }
 
 #[inline(always)]
@@ -96,6 +72,16 @@ pub(crate) fn connect<S: Scalar>(
     }
 }
 
+/// Resistances of the windings, warm.
+#[inline(always)]
+pub(crate) fn resistance<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, s: &State<S>) -> [S; 3] {
+    if FULL && structure.thermal {
+        three!(|j| m.star.resistance[j] * s.star.resistance_factor)
+    } else {
+        m.star.resistance
+    }
+}
+
 /// New phase currents and the phase-to-neutral voltages of this step.
 #[inline(always)]
 pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
@@ -104,12 +90,10 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     s: &mut State<S>,
     c: &Coupling<S>,
     half_supply: S,
-    gates: Gates<'_, S>,
+    old_legs: [S; 3],
 ) -> ([S; 3], [S; 3]) {
-    let mut resistance = m.star.resistance;
-    if FULL && structure.thermal {
-        resistance = three!(|j| resistance[j] * s.star.resistance_factor);
-    }
+    let resistance = resistance::<S, FULL>(m, structure, s);
+    let gates = Gates::At(old_legs);
     if EXTRA && structure.shorted {
         let (turns, voltage) = shorted_step(m, structure, s, c, &Fed { half_supply, gates, resistance });
         return (three!(|j| turns[j]), three!(|j| voltage[j]));
@@ -147,14 +131,27 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
         if let Some(legs) = &legs {
             current = extinguish(legs, i, current);
         }
-        if structure.accounts {
-            account_electric(m, s, i, current, rail, terminal, resistance);
-        }
-        if EXTRA && structure.heat {
-            collect_heat(m, s, i, current, resistance);
-        }
+        book::<S, EXTRA>(m, structure, s, [i, current], [rail, terminal], resistance);
     }
     (current, voltage)
+}
+
+/// Energies and heat of a step, where they are wanted.
+#[inline(always)]
+pub(crate) fn book<S: Scalar, const EXTRA: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &mut State<S>,
+    [old, new]: [[S; 3]; 2],
+    [rail, terminal]: [[S; 3]; 2],
+    resistance: [S; 3],
+) {
+    if structure.accounts {
+        account_electric(m, s, old, new, rail, terminal, resistance);
+    }
+    if EXTRA && structure.heat {
+        collect_heat(m, s, old, new, resistance);
+    }
 }
 
 /// `electric_step` with every detail, as a function of its own: contacts and bridge are the largest code of a step, and a
@@ -173,7 +170,7 @@ impl<S: Scalar> Kernel for Detailed<'_, S> {
     #[inline(always)]
     fn run(self) -> Self::Output {
         let Self { model, structure, state, coupling, half_supply, old_legs } = self;
-        electric_step::<S, true, true>(model, structure, state, coupling, half_supply, Gates::At(old_legs))
+        electric_step::<S, true, true>(model, structure, state, coupling, half_supply, old_legs)
     }
 }
 
@@ -205,6 +202,8 @@ fn collect_heat<S: Scalar>(m: &Model<S>, s: &mut State<S>, old: [S; 3], new: [S;
     let half = S::splat(0.5);
     let middle: [S; 3] = three!(|j| half * (old[j] + new[j]));
     let loss: [S; 3] = three!(|j| resistance[j] * middle[j] * middle[j]);
+    let windings = &mut s.extra.network.windings;
+    *windings = three!(|j| m.dt.fma(loss[j], windings[j]));
     let collected = &mut s.extra.network.collected;
     collected[0] = m.dt.fma(loss[0] + loss[1] + loss[2], collected[0]);
 }

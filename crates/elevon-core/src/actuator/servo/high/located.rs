@@ -5,8 +5,8 @@
 use super::carrier::middle;
 use super::crossing::{turned, Seen, Switched};
 use super::electric::coupling_at;
-use super::model::{Model, State, E_SUPPLY};
-use super::step::{acquire, link_voltage, lose_switching, measure, park, sense};
+use super::model::{Model, State};
+use super::step::{acquire, lose_switching, measure, move_on, park, sense, Feed};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step, transition};
@@ -53,35 +53,25 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     let (sines, cosines) = three_phase(sin_c, cos_c);
 
     // Power electronics.
-    let source = x.supply * m.supply_scale;
-    let supply = if FULL { link_voltage(m, structure, s, source) } else { source };
+    let feed = Feed::begin::<FULL>(m, structure, x, s);
     let shape = if FULL && structure.six_step { six_step(sines) } else { sines };
     let error: [S; 3] = three!(|j| s.current_ref * shape[j] - measured[j]);
-    let drawn_before = s.energy[E_SUPPLY];
-    let old_legs = set_legs::<S, FULL>(m, structure, s, error, supply);
+    let old_legs = set_legs::<S, FULL>(m, structure, s, error, feed.supply);
 
     // Motor electromagnetics.
     let coupling = coupling_at::<S, FULL>(m, structure, s, position, [sin, cos]);
-    let circuit = Switched { model: m, structure, coupling: &coupling, half_supply: half * supply };
+    let circuit = Switched { model: m, structure, coupling: &coupling, half_supply: half * feed.supply };
     let seen = Seen { error, shape: turned::<S, FULL>(m, structure, [sines, cosines], rate) };
     let wound = circuit.step::<FULL>(s, old_legs, &seen);
     let torque = m.star.saturate(m.star.torque(coupling.k, wound.mean));
-    if FULL && structure.link {
-        m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
-        s.bridge.tripped = s.bridge.tripped.maximum(m.extra.link.tripped(&s.extra.link));
-    }
+    feed.end::<FULL>(m, structure, s);
     if structure.acquisition {
         let (v_q, _) = park(wound.voltage, sines, cosines);
         acquire(m, s, park(measured, sines, cosines), v_q);
     }
 
     // Motor and transmission dynamics.
-    if FULL && structure.shaft.flanks {
-        m.shaft.hold_flank::<FULL>(&structure.shaft, x, &mut s.shaft, torque);
-    }
-    let loads = m.shaft.loads::<FULL, FULL>(&structure.shaft, x, &s.shaft, torque);
-    m.shaft.step::<FULL, FULL>(&structure.shaft, x, &mut s.shaft, &loads, torque);
-    s.star.current = wound.current;
+    move_on::<S, FULL, FULL>(m, structure, x, s, (torque, wound.current));
 }
 
 /// The step of the inner loop behind located relays, with every detail or with none.
@@ -93,6 +83,10 @@ impl<S: Scalar, const FULL: bool> Stepper<S> for LocatedStep<FULL> {
     type State = State<S>;
     const IN_REGISTERS: bool = !FULL;
 
+    #[inline(always)]
+    fn commanded(structure: &Structure) -> bool {
+        structure.control_every_step
+    }
     #[inline(always)]
     fn dt(model: &Model<S>) -> S {
         model.dt

@@ -8,13 +8,13 @@ use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::{CurrentControl, CurrentControlState, PwmParameter};
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
-use crate::inverter::carrier::Carrier;
+use crate::inverter::carrier::{Carrier, Window};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::inverter::losses::{DriveHeat, DriveHeatState, SwitchingParameter};
 use crate::motor::pole::WeakPole;
 use crate::motor::short::{Discrete, Shorts};
 use crate::motor::star::{MotorParameter, Star, StarState};
-use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
+use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::filter::closing;
@@ -60,7 +60,9 @@ pub struct State<S> {
     pub(crate) middle: S,
     /// Commands of the legs (+1 high, -1 low, 0 off); behind a carrier their means over the last step.
     pub(crate) legs: [S; 3],
-    /// Those at its end.
+    /// Edges of the carrier's present period.
+    pub(crate) window: Window<S>,
+    /// Commands at the end of the last step, behind a carrier with a detailed bridge.
     pub(crate) commands: [S; 3],
     pub(crate) bridge: BridgeState<S>,
     pub(crate) control: PositionSpeedState<S>,
@@ -73,6 +75,7 @@ pub struct State<S> {
     /// What the current sensors showed last.
     pub(crate) current_reading: [S; 3],
     pub(crate) filtered: [S; 3],
+    /// Of relays; the window counts those behind a carrier.
     pub(crate) transitions: S,
     /// Phase-to-neutral voltages of the last step (detailed bridge).
     pub(crate) voltage: [S; 3],
@@ -162,6 +165,11 @@ pub(crate) fn network<S: Scalar>(raw: &[S], dt: f64) -> Network<S> {
         at(MotorParameter::FluxTemperatureCoefficient),
     ];
     Network::derive(Raw(raw).thermal(), temperature, network_period(raw, dt))
+}
+
+/// Is there a thermal network?
+pub(crate) fn heated<S: Scalar>(raw: &[S]) -> bool {
+    ThermalModel::read(raw[ThermalParameter::Model.at()]) != ThermalModel::Off
 }
 
 /// Tick of the thermal network, s.

@@ -30,7 +30,7 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
     #[inline(always)]
     fn run(self) {
         let Self { structure, model, inputs, state, t, linear, out } = self;
-        states(structure, model, state, out);
+        states(structure, model, state, t, out);
         out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
         electrical(structure, model, inputs, state, t, out);
         let x = Instant::at(inputs, t);
@@ -44,7 +44,7 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
 
 /// What stands in the state.
 #[inline(always)]
-fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
+fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, t: S, out: &mut [S]) {
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::OutputPosition, s.shaft.output_position);
     set(Q::MotorPosition, s.shaft.motor_position);
@@ -52,11 +52,14 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
     set(Q::SpeedRef, s.control.speed_ref);
     set(Q::TorqueRef, s.control.torque_ref);
     set(Q::CurrentRef, s.current_ref);
-    set(Q::LegTransitions, s.transitions);
+    set(Q::LegTransitions, if structure.drive == DriveKind::Pwm { m.carrier.edges(&s.window, t) } else { s.transitions });
     set(Q::Tripped, s.bridge.tripped.maximum(s.extra.network.over));
     let warm = &s.extra.network;
     set(Q::WindingTemperature, if structure.heat { warm.winding } else { m.temperature });
-    set(Q::SurfaceTemperature, warm.surface);
+    set(Q::WindingTemperatureHottest, if structure.heat { m.extra.network.hottest(warm) } else { m.temperature });
+    set(Q::SurfaceTemperature, m.extra.network.housing(structure.heat, warm));
+    set(Q::AmbientTemperature, m.extra.network.air());
+    set(Q::HeatPhaseHottest, warm.hottest);
     set(Q::HeatCopper, warm.power[0]);
     set(Q::HeatLoop, warm.power[1]);
     set(Q::HeatContact, warm.power[2]);

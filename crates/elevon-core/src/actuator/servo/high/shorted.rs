@@ -118,6 +118,8 @@ fn book<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, x: &So
         energy[E_TAP] = energy[E_TAP] + account.tap;
     }
     if structure.heat {
+        let windings = &mut s.extra.network.windings;
+        *windings = three!(|j| windings[j] + account.phases[j]);
         let collected = &mut s.extra.network.collected;
         collected[0] = collected[0] + (account.copper - account.loops);
         collected[1] = collected[1] + account.loops;

@@ -1,15 +1,16 @@
 //! The state at the start of a run, and after a fault changed parameters.
 
-use super::model::{network, ExtraState, Model, State};
+use super::model::{heated, network, ExtraState, Model, State};
 use super::shorted::discrete;
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::*;
 use crate::control::current_dq::CurrentControlState;
 use crate::control::position_speed::PositionSpeedState;
 use crate::inverter::bridge::BridgeState;
+use crate::inverter::carrier::Window;
 use crate::inverter::link::DcLinkState;
 use crate::motor::star::{MotorParameter, StarState};
-use crate::motor::thermal::{NetworkState, ThermalModel, ThermalParameter};
+use crate::motor::thermal::NetworkState;
 use crate::scalar::Scalar;
 use crate::three;
 
@@ -29,15 +30,17 @@ pub(crate) const INITIAL: &[&str] = &[
 pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
     let or = |i: usize, other: S| S::select(initial[i].equals(initial[i]), initial[i], other);
     let zero = S::zero();
-    let shaft = model.shaft.start([initial[0], initial[1]], [initial[2], initial[3]]);
+    let mut shaft = model.shaft.start([initial[0], initial[1]], [initial[2], initial[3]]);
     let mut star = StarState::initial();
     star.current = three!(|j| or(4 + j, zero));
     let warm = model.extra.network.start_at([initial[7], initial[8]]);
     heat(raw, &mut star, &warm);
+    model.shaft.lubricate(&mut shaft, model.extra.network.housing(heated(raw), &warm));
     State {
         star,
         middle: (S::splat(0.5) * model.dt).fma(shaft.motor_speed, shaft.motor_position),
         legs: [-S::one(); 3],
+        window: Window::initial(),
         commands: [-S::one(); 3],
         bridge: BridgeState::initial(),
         control: PositionSpeedState::initial(),
@@ -65,15 +68,23 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
 
 pub(crate) fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
-    state.current_control.look_for_edges();
+    lubricate(model, structure, state);
+    state.window.renew();
     if structure.shorted {
         state.extra.contacts = discrete(model, &state.star);
     }
 }
 
+/// Gives the lubricant the housing's temperature.
+pub(crate) fn lubricate<S: Scalar>(model: &Model<S>, structure: &Structure, state: &mut State<S>) {
+    if structure.shaft.lubricated {
+        model.shaft.lubricate(&mut state.shaft, model.extra.network.housing(structure.heat, &state.extra.network));
+    }
+}
+
 /// Temperature factors: of the network where there is one, else of the given winding temperature.
 fn heat<S: Scalar>(raw: &[S], star: &mut StarState<S>, warm: &NetworkState<S>) {
-    if ThermalModel::read(raw[ThermalParameter::Model.at()]) == ThermalModel::Off {
+    if !heated(raw) {
         star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
     } else {
         let dt = raw[SolverParameter::Step.at()].lane(0);

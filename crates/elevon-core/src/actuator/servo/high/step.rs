@@ -2,7 +2,7 @@
 //! motor, transmission, acquisition. With `FULL` false the optional details compile to nothing, with `EXTRA` false those
 //! that only some servos have; a detail at its healthy value changes no bit, so the forms agree exactly where both apply.
 
-use super::electric::{coupling, electric_step, motor_torque, Gates};
+use super::electric::{coupling, electric_step, motor_torque};
 use super::model::{Model, State, E_INVERTER, E_SUPPLY};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::details::Structure;
@@ -135,6 +135,50 @@ pub(crate) fn measure<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<
     measured
 }
 
+/// What feeds the bridge during a step.
+pub(crate) struct Feed<S> {
+    source: S,
+    /// Voltage of the bridge.
+    pub supply: S,
+    /// Energy drawn before the step.
+    drawn: S,
+}
+
+impl<S: Scalar> Feed<S> {
+    #[inline(always)]
+    pub fn begin<const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &State<S>) -> Self {
+        let source = x.supply * m.supply_scale;
+        let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
+        Self { source, supply, drawn: s.energy[E_SUPPLY] }
+    }
+
+    /// The link's capacitor gives what the step has drawn.
+    #[inline(always)]
+    pub fn end<const EXTRA: bool>(&self, m: &Model<S>, structure: &Structure, s: &mut State<S>) {
+        if EXTRA && structure.link {
+            m.extra.link.step(&mut s.extra.link, self.source, s.energy[E_SUPPLY] - self.drawn);
+            s.bridge.tripped = s.bridge.tripped.maximum(m.extra.link.tripped(&s.extra.link));
+        }
+    }
+}
+
+/// The shaft under the motor's torque, and the windings with their new currents.
+#[inline(always)]
+pub(crate) fn move_on<S: Scalar, const FULL: bool, const EXTRA: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    x: &Instant<S>,
+    s: &mut State<S>,
+    (torque, current): (S, [S; 3]),
+) {
+    if FULL && structure.shaft.flanks {
+        m.shaft.hold_flank::<EXTRA>(&structure.shaft, x, &mut s.shaft, torque);
+    }
+    let loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
+    m.shaft.step::<FULL, EXTRA>(&structure.shaft, x, &mut s.shaft, &loads, torque);
+    s.star.current = current;
+}
+
 /// The filters of the acquisition: currents (q, d) and the quadrature voltage.
 #[inline(always)]
 pub(crate) fn acquire<S: Scalar>(m: &Model<S>, s: &mut State<S>, (q, d): (S, S), v_q: S) {
@@ -157,9 +201,8 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     let (sin_phases, cos_phases) = three_phase(sin_c, cos_c);
 
     // Power electronics.
-    let source = x.supply * m.supply_scale;
-    let supply = if EXTRA { link_voltage(m, structure, s, source) } else { source };
-    let half_supply = S::splat(0.5) * supply;
+    let feed = Feed::begin::<EXTRA>(m, structure, x, s);
+    let half_supply = S::splat(0.5) * feed.supply;
     let old_legs = three!(|j| s.legs[j]);
     let mut legs;
     if FULL && structure.drive == DriveKind::Off {
@@ -178,32 +221,23 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         s.transitions = count_transitions(s.transitions, old_legs, legs);
         s.legs = legs;
     }
-    let drawn_before = s.energy[E_SUPPLY];
     if EXTRA && structure.switching {
-        lose_switching(m, s, supply, old_legs, s.legs);
+        lose_switching(m, s, feed.supply, old_legs, s.legs);
     }
 
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
     let torque = motor_torque(m, s, &c);
-    let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, Gates::At(old_legs));
+    let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
     let (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
-    if EXTRA && structure.link {
-        m.extra.link.step(&mut s.extra.link, source, s.energy[E_SUPPLY] - drawn_before);
-        s.bridge.tripped = s.bridge.tripped.maximum(m.extra.link.tripped(&s.extra.link));
-    }
+    feed.end::<EXTRA>(m, structure, s);
     if structure.acquisition {
         let (v_q, _) = park(voltage, sin_phases, cos_phases);
         acquire(m, s, park(measured, sin_phases, cos_phases), v_q);
     }
 
     // Motor and transmission dynamics.
-    if FULL && structure.shaft.flanks {
-        m.shaft.hold_flank::<EXTRA>(&structure.shaft, x, &mut s.shaft, torque);
-    }
-    let loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
-    m.shaft.step::<FULL, EXTRA>(&structure.shaft, x, &mut s.shaft, &loads, torque);
-    s.star.current = current;
+    move_on::<S, FULL, EXTRA>(m, structure, x, s, (torque, current));
 }
 
 /// The step of the inner loop behind relays, or without a drive.
@@ -215,6 +249,10 @@ impl<S: Scalar, const FULL: bool, const EXTRA: bool> Stepper<S> for HighStep<FUL
     type State = State<S>;
     const IN_REGISTERS: bool = !FULL;
 
+    #[inline(always)]
+    fn commanded(structure: &Structure) -> bool {
+        structure.control_every_step
+    }
     #[inline(always)]
     fn dt(model: &Model<S>) -> S {
         model.dt

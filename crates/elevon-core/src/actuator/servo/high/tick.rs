@@ -3,6 +3,7 @@
 
 use super::model::{Model, State, E_INVERTER};
 use super::shorted::discrete;
+use super::start::lubricate;
 use super::step::{control_step, link_voltage, park, seen_current, shaft_reading};
 use crate::actuator::servo::details::{sample_steps, Structure};
 use crate::actuator::servo::layout::*;
@@ -73,7 +74,7 @@ impl<S: Scalar> Kernel for Event<'_, S> {
             THERMAL => warm(structure, m, s),
             DEBRIS => s.shaft.scatter(&m.shaft.screw, noise(4)),
             RESOLVER_NOISE => s.sensed.noise = [noise(5), noise(6)],
-            DUTIES => s.current_control.update(),
+            DUTIES => update_duties(s),
             _ => control_current(structure, m, inputs, s, t),
         }
     }
@@ -86,6 +87,7 @@ fn warm<S: Scalar>(structure: &Structure, m: &Model<S>, s: &mut State<S>) {
     m.shaft.nut.tick(&mut s.shaft.nut);
     m.extra.drive_heat.tick(&mut s.extra.drive_heat, s.energy[E_INVERTER]);
     (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
+    lubricate(m, structure, s);
     if structure.shorted {
         s.extra.contacts = discrete(m, &s.star);
     }
@@ -105,6 +107,13 @@ fn control_current<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inpu
     let sample = CurrentSample { reference_d: S::zero(), reference_q: s.current_ref, current_d, current_q, speed, angle, supply };
     m.current_control.step(&mut s.current_control, &sample);
     if structure.duty_delay == 0 {
-        s.current_control.update();
+        update_duties(s);
     }
+}
+
+/// The duties computed from the last sample act from now on.
+#[inline(always)]
+fn update_duties<S: Scalar>(s: &mut State<S>) {
+    s.current_control.update();
+    s.window.renew();
 }

@@ -3,6 +3,7 @@
 
 use super::jump::Jumps;
 use super::model::{Model, State, Structure};
+use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::layout::*;
 use crate::control::position_speed::{ControlParameter, ErrorHold, Mode};
 use crate::scalar::Scalar;
@@ -81,9 +82,16 @@ fn slew<S: Scalar>(m: &Model<S>, supply: S) -> S {
     m.drive.voltage_ratio * supply * m.drive.supply_scale / (m.cold[2] * m.control.per_torque_constant)
 }
 
-/// Commanded speed, within its limit.
+/// Commanded speed, within its limit, and what the command adds to it by the step's end: a torque that is held over the step
+/// answers to what happens in it, not before it.
 #[inline(always)]
-fn speed_reference<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, command: S, position_error: S) -> S {
+fn speed_reference<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    s: &mut State<S>,
+    [command, added]: [S; 2],
+    position_error: S,
+) -> [S; 2] {
     let c = &m.control;
     let demanded = match structure.control.mode {
         Mode::Position if structure.control.feedforward => {
@@ -95,7 +103,9 @@ fn speed_reference<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State
         Mode::Position => c.position_gain * position_error,
         Mode::Speed | Mode::Torque => command,
     };
-    demanded.clamp_abs(c.speed_limit)
+    let rise = if structure.control.mode == Mode::Position { c.position_gain * added } else { added };
+    let reference = demanded.clamp_abs(c.speed_limit);
+    [reference, (demanded + rise).clamp_abs(c.speed_limit) - reference]
 }
 
 /// Change of the speed that the resolver reports on top of the shaft's acceleration, which is solved for.
@@ -115,31 +125,32 @@ pub(super) fn demand<S: Scalar, const FULL: bool>(
     m: &Model<S>,
     structure: &Structure,
     s: &mut State<S>,
-    [command, supply]: [S; 2],
+    x: &Instant<S>,
     position: S,
     reading: &Reading<S>,
 ) -> Demand<S> {
     let c = &m.control;
     let (zero, speed) = (S::zero(), reading.speed);
+    let command = x.command + s.command_noise;
     let position_error = command - position;
     if structure.control.pid {
         return position_pid(m, structure, s, position_error, speed);
     }
-    let speed_ref = speed_reference(m, structure, s, command, position_error);
+    let [speed_ref, ahead] = speed_reference(m, structure, s, [command, x.next - x.command], position_error);
     let error = speed_ref - speed;
     let none = Demand { speed_ref, error, position_error, speed, torque: command, cut: zero };
     if structure.control.mode == Mode::Torque {
         return none;
     }
     let change = speed_ref - s.jumps.reference - reading_deviation::<S, FULL>(m, structure, s, speed);
-    s.jumps.reference = speed_ref;
+    s.jumps.reference = speed_ref + ahead;
     let mut torque = c.speed_gain * error + s.integral;
     let mut cut = zero;
     if structure.control.derivative {
         let (smooth, jump) = c.jumps.split(&mut s.jumps, change);
-        torque = torque + c.derivative_inertia * (smooth * c.per_dt);
+        torque = torque + c.derivative_inertia * ((smooth + ahead) * c.per_dt);
         if S::any(!(jump.equals(zero) & s.jumps.level.equals(zero))) {
-            let kick = c.jumps.pass(&mut s.jumps, jump, c.torque_limit, slew(m, supply));
+            let kick = c.jumps.pass(&mut s.jumps, jump, c.torque_limit, slew(m, x.supply));
             torque = torque + kick.torque;
             cut = kick.cut;
         }

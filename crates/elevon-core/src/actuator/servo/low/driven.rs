@@ -34,6 +34,8 @@ pub(super) struct Driven<S> {
     /// Means over the step: torque, copper loss, power drawn from the link, quadrature voltage in the drive's frame.
     pub torque: S,
     pub copper: S,
+    /// Copper loss of each phase.
+    pub windings: [S; 3],
     pub drawn: S,
     pub voltage: S,
     /// Quadrature component at the step's end, in the rotor's frame and as the drive's sensors report it.
@@ -75,7 +77,8 @@ pub(super) fn driven_step<S: Scalar>(
     let resistance: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor);
     let gain = per_winding(m, resistance, dt);
     let per_volt = three!(|j| S::select(half.le(m.star.open[j]), zero, gain[j]));
-    let mut x = Driven { phases: i, torque: zero, copper: zero, drawn: zero, voltage: zero, quadrature: zero, seen: zero };
+    let mut x =
+        Driven { phases: i, torque: zero, copper: zero, windings: [zero; 3], drawn: zero, voltage: zero, quadrature: zero, seen: zero };
     let mut k = zero;
     // Where the shaft's position takes the new speed, speed and currents stand half a step before it.
     let middle = if structure.shaft.middle { zero } else { half * parts };
@@ -102,6 +105,7 @@ pub(super) fn driven_step<S: Scalar>(
         for j in 0..3 {
             x.torque = sum(x.torque, along[j] * s.flux_factor * mean[j]);
             x.copper = sum(x.copper, resistance[j] * mean[j] * mean[j]);
+            x.windings[j] = sum(x.windings[j], resistance[j] * mean[j] * mean[j]);
             x.drawn = sum(x.drawn, memory.legs[j] * mean[j]);
         }
         x.voltage = sum(x.voltage, quadrature(memory.legs, sines));

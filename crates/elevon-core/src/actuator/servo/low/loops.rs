@@ -32,8 +32,8 @@ pub struct Loops<S> {
 /// What the loops add to a step.
 pub(super) struct Added<S> {
     pub torque: S,
-    /// Loss in the shorted copper and in the contacts, W.
-    pub copper: S,
+    /// Loss in the shorted copper of each phase and in the contacts, W.
+    pub copper: [S; 3],
     pub contact: S,
 }
 
@@ -64,7 +64,7 @@ impl<S: Scalar> Loops<S> {
     pub(super) fn step(&self, s: &mut State<S>, p: &Phase<S>, before: [S; 3], after: [S; 3]) -> Added<S> {
         let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
         let speed = s.shaft.motor_speed;
-        let mut added = Added { torque: zero, copper: zero, contact: zero };
+        let mut added = Added { torque: zero, copper: [zero; 3], contact: zero };
         for j in 0..3 {
             let there = zero.lt(self.turns[j]);
             let value = self.resistance[j] * s.resistance_factor;
@@ -77,7 +77,7 @@ impl<S: Scalar> Loops<S> {
             let middle = half * (s.loops[j] + new);
             added.torque = added.torque + k * middle;
             let through = S::select(there, half * (before[j] + after[j]) - middle, zero);
-            added.copper = added.copper + value * middle * middle;
+            added.copper[j] = value * middle * middle;
             added.contact = added.contact + self.contact * through * through;
             s.loops[j] = new;
         }

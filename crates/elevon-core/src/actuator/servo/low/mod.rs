@@ -96,13 +96,14 @@ impl<F: Form> Wiring for Low<F> {
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         model.start(raw, initial)
     }
-    fn refresh<S: Scalar>(_model: &Model<S>, _structure: &Structure, raw: &[S], state: &mut State<S>) {
+    fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
         state.refresh(raw);
+        model.lubricate(structure, state);
     }
 
     fn tick<S: Scalar>(
         kind: u8,
-        _structure: &Structure,
+        structure: &Structure,
         m: &Model<S>,
         _inputs: &Inputs<S>,
         s: &mut State<S>,
@@ -114,6 +115,7 @@ impl<F: Form> Wiring for Low<F> {
                 m.network.tick(&mut s.network);
                 m.shaft.nut.tick(&mut s.shaft.nut);
                 (s.resistance_factor, s.flux_factor) = m.network.factors(&s.network);
+                m.lubricate(structure, s);
             }
             TICK_COMMAND_NOISE => s.command_noise = m.control.noise_deviation * noise(0),
             _ => s.shaft.scatter(&m.shaft.screw, noise(4)),

@@ -6,7 +6,7 @@ use super::jump::JumpState;
 use super::loops::Loops;
 use super::phase::Phase;
 use crate::actuator::servo::form::Form;
-use crate::actuator::servo::high::model::network;
+use crate::actuator::servo::high::model::{heated, network};
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::{Sensed, Sensing, SensingDetails};
 use crate::actuator::servo::shaft::{Shaft, ShaftDetails, ShaftNeeds, ShaftState};
@@ -18,12 +18,15 @@ use crate::inverter::link::{DcLink, DcLinkState};
 use crate::motor::equivalent::{Circuit, LowParameter};
 use crate::motor::pole::WeakPole;
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, ShortModel, Star, StarState};
-use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
+use crate::motor::thermal::{Network, NetworkState};
 use crate::scalar::Scalar;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::filter::closing;
 use crate::sensor::resolver::{Resolver, ResolverParameter};
 use crate::three;
+
+/// Error of the references, rad or relative, from which on three windings are stepped for good: the cosine is 0.995.
+const WHOLE: f64 = 0.1;
 
 details! {
     /// What of a reduced-order servo model a run needs; equal over a lane block.
@@ -82,6 +85,8 @@ details! {
             DriveKind::Pwm => unseen || misled || interrupted(&parts.motor()),
             DriveKind::Off => false,
         };
+        /// Faults that come by degrees alone make it so: small ones leave one current.
+        gradual = driven && !(six_step || unseen || interrupted(&parts.motor()));
         /// The references stand apart from the rotor by an angle that does not change.
         turned = misled && parts.resolver().away(ResolverParameter::Offset);
         heat = Network::<f64>::needed(&parts.thermal());
@@ -137,6 +142,8 @@ pub struct Drive<S> {
     pub weight: [S; 3],
     pub gain: [S; 3],
     pub link: DcLink<S>,
+    /// Share of the three windings' step in what a step does; the rest is that of one current.
+    pub apart: S,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -176,7 +183,14 @@ pub struct State<S> {
 }
 
 impl<S: Scalar> Drive<S> {
-    fn derive(raw: &[S], structure: &Structure, star: &Star<S>, dt: S) -> Self {
+    /// Between what one current and what three windings make.
+    #[inline(always)]
+    pub(super) fn share(&self, one: S, three: S) -> S {
+        let part = self.apart.fma(three - one, one);
+        S::select(self.apart.equals(S::one()), three, part)
+    }
+
+    fn derive(raw: &[S], structure: &Structure, star: &Star<S>, sensing: &Sensing<S>, dt: S) -> Self {
         let at = |i: usize| raw[i];
         let (zero, one, half) = (S::zero(), S::one(), S::splat(0.5));
         let inductance = at(MotorParameter::WindingInductance.at());
@@ -209,8 +223,19 @@ impl<S: Scalar> Drive<S> {
             weight: three!(|j| S::select(half.le(star.open[j]), zero, followed[j])),
             gain,
             link: DcLink::derive(Raw(raw).link(), dt),
+            apart: if structure.gradual { apart(structure, star, sensing, gain) } else { one },
         }
     }
+}
+
+/// Errors of angle (electrical, rad) and of gains up to `WHOLE` go from one current to three windings, with no slope at either
+/// end: one current stands for three within their cosine, and what the two forms differ by in rounding their steps is no jump.
+fn apart<S: Scalar>(structure: &Structure, star: &Star<S>, sensing: &Sensing<S>, gain: [S; 3]) -> S {
+    let one = S::one();
+    let unlike = (gain[0] - one).abs().maximum((gain[1] - one).abs()).maximum((gain[2] - one).abs());
+    let turned = if structure.misled { star.pole_pairs * sensing.errors() } else { S::zero() };
+    let share = (turned.maximum(unlike) * S::splat(1.0 / WHOLE)).minimum(one);
+    share * share * (S::splat(3.0) - (share + share))
 }
 
 /// Of a first-order filter; none where there is no filter.
@@ -238,6 +263,7 @@ impl<S: Scalar> Model<S> {
         star.add_eccentricity(shaft.unbalance.eccentricity(shaft.inertia));
         let circuits = Loops::derive(raw, dt);
         let control = Control::derive(raw, structure, shaft.gear.ratio, dt);
+        let sensing = Sensing::derive_low(raw, &structure.sensing);
         let constant = S::splat(1.5) * at(MotorParameter::EmfConstant) * at(MotorParameter::FluxFraction);
         let cold = [constant, at(MotorParameter::WindingResistance), at(MotorParameter::WindingInductance)];
         let rise = at(MotorParameter::WindingTemperature) - at(MotorParameter::ReferenceTemperature);
@@ -250,14 +276,14 @@ impl<S: Scalar> Model<S> {
             inductance: if structure.loops { circuits.intact } else { three!(|j| one / star.per_inductance[j]) },
             healthy: Phase::new(constant * flux_factor, circuit, &control, shaft.inertia),
             cold,
-            drive: Drive::derive(raw, structure, &star, dt),
+            drive: Drive::derive(raw, structure, &star, &sensing, dt),
             circuits,
             star,
             pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
             control,
             per_inertia: one / shaft.inertia,
             shaft,
-            sensing: Sensing::derive_low(raw, &structure.sensing),
+            sensing,
             filter: closing(raw[CurrentSensorParameter::FilterCutoff.at()], dt.lane(0)),
             temperature: at(MotorParameter::WindingTemperature),
             network: network(raw, dt.lane(0)),
@@ -266,8 +292,9 @@ impl<S: Scalar> Model<S> {
 
     pub(super) fn start(&self, raw: &[S], initial: &[S]) -> State<S> {
         let (zero, nan) = (S::zero(), S::splat(f64::NAN));
-        let shaft = self.shaft.start([initial[0], initial[1]], [initial[2], nan]);
+        let mut shaft = self.shaft.start([initial[0], initial[1]], [initial[2], nan]);
         let warm = self.network.start_at([initial[3], initial[4]]);
+        self.shaft.lubricate(&mut shaft, self.network.housing(heated(raw), &warm));
         let (resistance_factor, flux_factor) = heat(raw, &warm);
         State {
             link: DcLinkState::initial(),
@@ -300,6 +327,15 @@ impl<S: Scalar> Model<S> {
     }
 }
 
+impl<S: Scalar> Model<S> {
+    /// Gives the lubricant the housing's temperature.
+    pub(super) fn lubricate(&self, structure: &Structure, s: &mut State<S>) {
+        if structure.shaft.lubricated {
+            self.shaft.lubricate(&mut s.shaft, self.network.housing(structure.heat, &s.network));
+        }
+    }
+}
+
 impl<S: Scalar> State<S> {
     pub(super) fn refresh(&mut self, raw: &[S]) {
         (self.resistance_factor, self.flux_factor) = heat(raw, &self.network);
@@ -308,7 +344,7 @@ impl<S: Scalar> State<S> {
 
 /// Factors of the winding's resistance and of the flux.
 fn heat<S: Scalar>(raw: &[S], warm: &NetworkState<S>) -> (S, S) {
-    if ThermalModel::read(raw[ThermalParameter::Model.at()]) == ThermalModel::Off {
+    if !heated(raw) {
         let mut star = StarState::initial();
         star.heat(Raw(raw).motor(), raw[MotorParameter::WindingTemperature.at()]);
         return (star.resistance_factor, star.flux_factor);

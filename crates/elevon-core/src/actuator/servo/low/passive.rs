@@ -20,6 +20,8 @@ pub(super) struct Passive<S> {
     /// Means over the step: torque, copper loss, power drawn from the link.
     pub torque: S,
     pub copper: S,
+    /// Copper loss of each phase.
+    pub windings: [S; 3],
     pub drawn: S,
     /// Quadrature component at the step's end, in the rotor's frame and in the drive's.
     pub quadrature: S,
@@ -65,7 +67,7 @@ pub(super) fn passive_step<S: Scalar>(
     let resistance: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor);
     let dt = share * m.dt;
     let part = Part { dt, half_supply: half * supply, resistance, per_winding: per_winding(m, resistance, dt) };
-    let mut x = Passive { phases: i, torque: zero, copper: zero, drawn: zero, quadrature: zero, seen: zero };
+    let mut x = Passive { phases: i, torque: zero, copper: zero, windings: [zero; 3], drawn: zero, quadrature: zero, seen: zero };
     let mut k = zero;
     // Lanes that have all their parts wait for the others.
     while S::any(k.lt(parts)) {
@@ -78,6 +80,7 @@ pub(super) fn passive_step<S: Scalar>(
             let sum = |total: S, value: S| S::select(running, share.fma(value, total), total);
             x.torque = sum(x.torque, along[j] * middle[j]);
             x.copper = sum(x.copper, resistance[j] * middle[j] * middle[j]);
+            x.windings[j] = sum(x.windings[j], resistance[j] * middle[j] * middle[j]);
             x.drawn = sum(x.drawn, rail[j] * middle[j]);
         }
         x.phases = three!(|j| S::select(running, after[j], x.phases[j]));

@@ -52,19 +52,8 @@ impl<S: Scalar> Phase<S> {
 /// k_j at a motor position and the reference temperature.
 #[inline(always)]
 pub(super) fn coefficients<S: Scalar>(m: &Model<S>, structure: &Structure, position: S) -> [S; 3] {
-    let angle = m.star.electrical_angle(position);
-    let (sin, cos) = angle.sin_cos();
-    let shape = if structure.motor.trapezoidal { m.star.trapezoid(angle) } else { three_phase(sin, cos).0 };
-    let mut gap = m.star.static_gap(sin, cos);
-    if structure.motor.dynamic_eccentricity {
-        let turning = m.star.dynamic_gap(position);
-        gap = three!(|j| gap[j] * turning[j]);
-    }
-    if structure.motor.weak_pole {
-        let passing = m.pole.gap(position);
-        gap = three!(|j| gap[j] * passing[j]);
-    }
-    m.star.coefficients(shape, gap)
+    let (sin, cos) = m.star.electrical_angle(position).sin_cos();
+    m.star.coefficients::<true>(&structure.motor, Some(&m.pole), position, [sin, cos], None)
 }
 
 /// The phase at the shaft's angle, its currents imposed at the angle that the drive reads.

@@ -10,7 +10,7 @@ use super::relays::{mean_error, within_band, TorqueDemand};
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::ripple_square;
-use crate::scalar::Scalar;
+use crate::scalar::{three_phase, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::three;
 
@@ -74,17 +74,24 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     let mut loss = S::splat(1.5) * middle * middle * p.circuit.resistance;
     // Terminal power of the three phases, 3/2 v_q i_q.
     let mut power = S::splat(1.5) * s.voltage * middle;
+    let mut windings = if EXTRA && structure.heat { of_phases(m, structure, s, p, middle) } else { [S::zero(); 3] };
     let phases = s.phases;
     if EXTRA && structure.angle {
         s.phases = three!(|j| p.imposed[j] * reached);
     }
     if EXTRA && structure.driven {
         s.phases = phases;
+        let imposed: [S; 3] = three!(|j| p.imposed[j] * reached);
         let x = driven_step(m, structure, [supply, band], s, p, current_ref);
-        s.phases = x.phases;
-        (s.current, s.current_q, s.current_seen) = (x.seen, x.quadrature, x.seen);
-        (s.motor_torque, s.voltage) = (x.torque, x.voltage);
-        (loss, power) = (x.copper, x.drawn);
+        let mix = |one: S, three: S| m.drive.share(one, three);
+        s.phases = three!(|j| mix(imposed[j], x.phases[j]));
+        s.current = mix(s.current, x.seen);
+        s.current_q = mix(s.current_q, x.quadrature);
+        s.current_seen = mix(s.current_seen, x.seen);
+        s.motor_torque = mix(s.motor_torque, x.torque);
+        s.voltage = mix(s.voltage, x.voltage);
+        (loss, power) = (mix(loss, x.copper), mix(power, x.drawn));
+        windings = three!(|j| mix(windings[j], x.windings[j]));
     }
     if EXTRA && structure.heat && structure.drive == DriveKind::Hysteresis {
         // Relays that switch leave a ripple, which heats and makes no mean torque.
@@ -94,7 +101,7 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
         (loss, power) = (loss + heat, power + heat);
     }
     if EXTRA && structure.passive {
-        (loss, power) = without_gates(m, structure, supply, s, p, phases, [loss, power]);
+        (loss, power, windings) = without_gates(m, structure, supply, s, p, phases, (loss, power, windings));
     }
     if EXTRA && structure.link {
         m.drive.link.step(&mut s.link, source, power * m.dt);
@@ -103,15 +110,30 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     if EXTRA && structure.loops {
         let added = m.circuits.step(s, p, phases, s.phases);
         s.motor_torque = s.motor_torque + added.torque;
-        s.network.collected[1] = m.dt.fma(added.copper, s.network.collected[1]);
+        let copper = added.copper[0] + added.copper[1] + added.copper[2];
+        windings = three!(|j| windings[j] + added.copper[j]);
+        s.network.collected[1] = m.dt.fma(copper, s.network.collected[1]);
         s.network.collected[2] = m.dt.fma(added.contact, s.network.collected[2]);
-        s.copper = m.dt.fma(added.copper, s.copper);
+        s.copper = m.dt.fma(copper, s.copper);
     }
     if EXTRA && structure.heat {
         let heat = loss * m.dt;
         s.network.collected[0] = s.network.collected[0] + heat;
+        s.network.windings = three!(|j| m.dt.fma(windings[j], s.network.windings[j]));
         s.copper = s.copper + heat;
     }
+}
+
+/// Copper loss of each phase with a mean current over the step.
+#[inline(always)]
+fn of_phases<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, p: &Phase<S>, mean: S) -> [S; 3] {
+    let shape = if structure.angle {
+        p.imposed
+    } else {
+        let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
+        three_phase(sin, cos).0
+    };
+    three!(|j| m.resistance[j] * s.resistance_factor * (shape[j] * mean).square())
 }
 
 /// Do all legs rest, by their mean voltages?
@@ -131,8 +153,8 @@ fn without_gates<S: Scalar>(
     s: &mut State<S>,
     p: &Phase<S>,
     before: [S; 3],
-    [loss, power]: [S; 2],
-) -> (S, S) {
+    (loss, power, windings): (S, S, [S; 3]),
+) -> (S, S, [S; 3]) {
     let (zero, half) = (S::zero(), S::splat(0.5));
     let imposed = s.phases;
     if structure.drive != DriveKind::Off {
@@ -145,7 +167,7 @@ fn without_gates<S: Scalar>(
         passive = passive | m.sensing.lost();
     }
     if !S::any(passive) {
-        return (loss, power);
+        return (loss, power, windings);
     }
     let x = passive_step(m, structure, supply, s, p, before);
     s.phases = three!(|j| S::select(passive, x.phases[j], imposed[j]));
@@ -153,7 +175,8 @@ fn without_gates<S: Scalar>(
     s.current_q = S::select(passive, x.quadrature, s.current_q);
     s.current_seen = S::select(passive, x.seen, s.current_seen);
     s.motor_torque = S::select(passive, x.torque, s.motor_torque);
-    (S::select(passive, x.copper, loss), S::select(passive, x.drawn, power))
+    let windings = three!(|j| S::select(passive, x.windings[j], windings[j]));
+    (S::select(passive, x.copper, loss), S::select(passive, x.drawn, power), windings)
 }
 
 #[inline(always)]
@@ -164,7 +187,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         m.sensing.count::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     }
     let position = m.sensing.output::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed, &reading, m.shaft.gear.per_ratio);
-    let demand = demand::<S, FULL>(m, structure, s, [x.command + s.command_noise, x.supply], position, &reading);
+    let demand = demand::<S, FULL>(m, structure, s, x, position, &reading);
 
     // Loads, and the acceleration that the derivative of the speed takes part in.
     let here;
@@ -186,8 +209,9 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     let mut answer = p.efficacy;
     if EXTRA && structure.driven {
         // The windings make of a reference what they can: the torque there is, and what a step adds to it.
-        answer = answer.maximum(S::zero()) * m.drive.tracking;
-        torque = answer.fma(demand.torque - s.torque_ref, s.motor_torque);
+        let adds = answer.maximum(S::zero()) * m.drive.tracking;
+        torque = m.drive.share(torque, adds.fma(demand.torque - s.torque_ref, s.motor_torque));
+        answer = m.drive.share(answer, adds);
         per_inertia = S::one() / answer.fma(derivative_inertia, shaft_inertia);
     }
     if FULL && structure.sensing.resolver {
@@ -197,13 +221,18 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     }
     let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
     let supply = supply::<S, EXTRA>(m, structure, x, s, p);
-    let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative && !(EXTRA && structure.driven);
-    let acceleration = if relays {
+    let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative;
+    let three = EXTRA && structure.driven;
+    let mut acceleration = S::zero();
+    if three || !relays {
+        acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
+    }
+    if relays && (!three || structure.gradual) {
+        let per_inertia = if three { S::one() / p.efficacy.fma(derivative_inertia, shaft_inertia) } else { per_inertia };
         let demand = TorqueDemand { torque: demand.torque, inertia: derivative_inertia, per_inertia, per_shaft };
-        within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, &loads)
-    } else {
-        m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia)
-    };
+        let one = within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, &loads);
+        acceleration = if three { m.drive.share(one, acceleration) } else { one };
+    }
     let unlimited = demand.torque - derivative_inertia * acceleration;
     s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
     integrate(m, structure, s, &demand, unlimited);
@@ -230,7 +259,12 @@ impl<S: Scalar, const FULL: bool, const EXTRA: bool> Stepper<S> for LowStep<FULL
     type Structure = Structure;
     type State = State<S>;
     const IN_REGISTERS: bool = !EXTRA;
+    const LOOKS_AHEAD: bool = true;
 
+    #[inline(always)]
+    fn commanded(_structure: &Structure) -> bool {
+        true
+    }
     #[inline(always)]
     fn dt(model: &Model<S>) -> S {
         model.dt

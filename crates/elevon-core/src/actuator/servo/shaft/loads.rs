@@ -60,12 +60,15 @@ impl<S: Scalar> Shaft<S> {
         let mut carried = through;
         if FULL {
             if d.loaded {
-                let moving = s.motor_speed.sign();
-                let direction = S::select(s.motor_speed.equals(S::zero()), (torque - load).sign(), moving);
+                let direction = self.direction(s, torque - load);
                 carried = self.through_gear::<EXTRA>(d, x, s, through, direction);
-                added = added + self.gear.load_friction(carried, direction);
+                let mut lost = self.gear.load_friction(carried, direction);
+                if EXTRA && d.lubricated {
+                    lost = lost * s.lubricant.loss;
+                }
+                added = added + lost;
                 if EXTRA && d.nut {
-                    nut = nut + self.screw.drag(carried, direction) * self.gear.per_ratio;
+                    nut = nut + self.screw_drag(d, s, carried, direction);
                 }
             }
             if d.jams {
@@ -80,10 +83,16 @@ impl<S: Scalar> Shaft<S> {
         if EXTRA && d.directed {
             limits = self.friction.in_direction(limits, s.motor_speed, torque - load);
         }
+        if EXTRA && d.lubricated {
+            limits = [limits[0] * s.lubricant.dry, limits[1] * s.lubricant.dry];
+        }
         let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
         if EXTRA {
             if d.preloaded {
-                let preload = self.screw.preload_torque * self.screw.relieved(carried);
+                let mut preload = self.screw.preload_torque * self.screw.relieved(carried);
+                if d.lubricated {
+                    preload = preload * s.lubricant.dry;
+                }
                 static_limit = static_limit + self.stick * preload;
                 dynamic = dynamic + preload;
                 nut = nut + preload;
@@ -107,10 +116,36 @@ impl<S: Scalar> Shaft<S> {
     pub(super) fn viscous<const FULL: bool, const EXTRA: bool>(&self, d: &ShaftDetails, s: &ShaftState<S>) -> S {
         let speed = s.motor_speed;
         let mut viscous = if FULL && d.sloped { self.friction.viscous_torque(speed) } else { self.friction.viscous * speed };
+        if EXTRA && d.lubricated {
+            viscous = viscous * s.lubricant.viscous;
+        }
         if EXTRA && d.load_side && !d.elastic {
             viscous = viscous + self.felt(d, s, self.load_damping) * self.gear.per_ratio * self.gear.per_ratio * speed;
         }
         viscous
+    }
+
+    /// Friction of the loaded screw on the motor shaft: what warms its nut.
+    #[inline(always)]
+    fn screw_drag(&self, d: &ShaftDetails, s: &ShaftState<S>, carried: S, direction: S) -> S {
+        let drag = self.screw.drag(carried, direction) * self.gear.per_ratio;
+        if d.lubricated {
+            drag * s.lubricant.loss
+        } else {
+            drag
+        }
+    }
+
+    /// Direction of the motion, or of the `active` torque that would start it: 1, -1 or 0.
+    #[inline(always)]
+    fn direction(&self, s: &ShaftState<S>, active: S) -> S {
+        let at_rest = s.motor_speed.equals(S::zero());
+        let moving = s.motor_speed.sign();
+        if !S::any(at_rest) {
+            // Where it moves the processor does not wait for the torque.
+            return moving;
+        }
+        S::select(at_rest, active.sign(), moving)
     }
 
     /// What gear and screw carry in the `direction` of motion, at the output: the signed load and, behind a rigid joint, the

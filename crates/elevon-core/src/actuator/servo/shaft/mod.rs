@@ -25,6 +25,7 @@ use crate::scalar::Scalar;
 use crate::transmission::backlash::{Backlash, BacklashModel, BacklashParameter};
 use crate::transmission::friction::Friction;
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
+use crate::transmission::lubricant::{Grease, Lubricant};
 use crate::transmission::nut_heat::{NutHeat, NutState};
 use crate::transmission::screw::Screw;
 use crate::transmission::tooth::Teeth;
@@ -68,6 +69,8 @@ details! {
         detailed_train = train.extra;
         /// The screw's friction warms a nut.
         directed = Friction::<f64>::directed(&x.parts.friction());
+        /// Friction changes with the temperature.
+        lubricated = Grease::<f64>::needed(&x.parts.lubricant());
         nut = F::LINEAR && Network::<f64>::needed(&x.parts.thermal());
         vibrates = !x.low && F::vibrates(x.parts.0);
     }
@@ -116,6 +119,7 @@ impl<'a> ShaftNeeds<'a> {
 pub struct Shaft<S> {
     dt: S,
     pub friction: Friction<S>,
+    grease: Grease<S>,
     pub gear: Gear<S>,
     pub backlash: Backlash<S>,
     pub screw: Screw<S>,
@@ -155,6 +159,7 @@ pub struct ShaftState<S> {
     pub fastest: S,
     /// Deflection of the bristles.
     bristle: S,
+    lubricant: Lubricant<S>,
     pub nut: NutState<S>,
     pub vibration: VibrationState<S>,
     flank: Flank<S>,
@@ -188,6 +193,7 @@ impl<S: Scalar> Shaft<S> {
         Self {
             dt,
             friction,
+            grease: Grease::derive(view.lubricant()),
             gear,
             backlash: Backlash::derive(view.backlash()),
             screw,
@@ -226,11 +232,19 @@ impl<S: Scalar> Shaft<S> {
             scatter: S::one(),
             fastest: zero,
             bristle: zero,
+            lubricant: Lubricant::reference(),
             nut: self.nut.start(),
             vibration: VibrationState::initial(),
             flank: Flank::at(driver - output_position, self.backlash.half),
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
+    }
+}
+
+impl<S: Scalar> Shaft<S> {
+    /// Gives the lubricant a temperature.
+    pub(super) fn lubricate(&self, s: &mut ShaftState<S>, temperature: S) {
+        s.lubricant = self.grease.at(temperature);
     }
 }
 

@@ -1,0 +1,113 @@
+"""The doors `elevon.calibrate` and `elevon.validate`: logs and records choose the way.
+
+An actuator with a control unit of its own, a servo with a preloaded screw that its logs weigh, a
+turning output with set point and both positions logged: each has its balances. Whatever else was
+logged is fitted in closed loop.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.drops import is_drop_table, run_drops
+from elevon.calibrate.ways import CalibrationRequest, way_of
+from elevon.logs.read import as_logs
+from elevon.simulate.arguments import as_actuator
+
+if TYPE_CHECKING:
+    from elevon.calibrate.outcome import Calibration
+    from elevon.calibrate.validation import Validation
+    from elevon.logs.read import LogsLike
+    from elevon.progress import Progress
+    from elevon.simulate.arguments import ActuatorLike
+
+__all__ = ["calibrate", "validate"]
+
+
+def calibrate(
+    logs: LogsLike,
+    actuator: ActuatorLike,
+    free: Sequence[str] | None = None,
+    *,
+    per_log: Sequence[str] = (),
+    fidelity: str | None = None,
+    transient: float | None = None,
+    promise: bool = False,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Estimate what logs determine of an actuator.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of them
+        Of one unit; or the file of a table of hung weights. `elevon.read_log` reads a log whose
+        columns need a map.
+    actuator : Actuator, str or path
+        Values before; those that are not estimated stay.
+    free : sequence of str, optional
+        Paths to estimate; default: all that the logs determine.
+    per_log : sequence of str
+        Estimated for each log too; only where both positions were logged.
+    fidelity : str, optional
+        Of the model runs, ``low`` or ``high``; default: low, or what the logs bear.
+    transient : float, optional
+        Seconds left out at the beginning of each log.
+    promise : bool
+        Whether logs are held out in turn: what an actuator file takes its thresholds from.
+    progress : callable, optional
+        Called with the done fraction; returns False to stop.
+
+    Returns
+    -------
+    Calibration
+        Its ``actuator`` has the values.
+
+    Raises
+    ------
+    InputError
+        A log that cannot be read, nothing determined, or not what was requested.
+    Interrupted
+        `progress` returned False.
+    """
+    model = as_actuator(actuator)
+    table = logs[0] if isinstance(logs, (list, tuple)) and len(logs) == 1 else logs
+    if isinstance(table, (str, os.PathLike)) and is_drop_table(Path(table)):
+        return run_drops(Path(table), model)
+    request = CalibrationRequest(free, per_log, fidelity, transient, promise)
+    return way_of(as_logs(logs), model).calibrate(model, request, progress)
+
+
+def validate(
+    logs: LogsLike,
+    actuator: ActuatorLike,
+    *,
+    fidelity: str = "low",
+    transient: float | None = None,
+    progress: Progress | None = None,
+) -> Validation:
+    """Hold an actuator against logs that it was not fitted to, signal by signal.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of them
+        As `calibrate`.
+    actuator : Actuator, str or path
+        The model; thresholds and the sensors' offsets from its ``[validation]`` table.
+    fidelity : str
+        ``low`` or ``high``.
+    transient : float, optional
+        Seconds left out; default: the actuator file's.
+    progress : callable, optional
+        Called with the done fraction; returns False to stop.
+
+    Raises
+    ------
+    InputError
+        A log that cannot be compared, a transient longer than a log.
+    """
+    model = as_actuator(actuator)
+    way = way_of(as_logs(logs), model, validating=True)
+    return way.validate(model, fidelity, transient, progress)

@@ -1,0 +1,174 @@
+"""One flow for every actuator: stages in their order, each uses what the ones before determined."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.stages import lock, loops, motor, rig, screw
+from elevon.calibrate.stages.context import Context, Stage, run_stages
+from elevon.calibrate.stages.drive import drive
+from elevon.calibrate.stages.heat import heat
+from elevon.calibrate.stages.loops_by_current import loops_by_current
+from elevon.calibrate.stages.moves import moves_of, rig_moves
+from elevon.errors import InputError, unknown
+from elevon.logs.log import Log
+from elevon.parameters.records import record_of, records
+from elevon.progress import Progress
+from elevon.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["STAGES", "calibrate_parts"]
+
+_FIDELITIES = ("auto", "low", "high")
+_UNIT = "control.gain_extension"  # an actuator with a control unit of its own has it
+_PRELOAD = "screw.efficiency_aiding"  # a preloaded screw has it
+
+
+STAGES = (
+    Stage("rig", _UNIT, "load_cell while a rig moves the ram both ways at several speeds",
+          "friction tables, harmonics, detent, hanging mass", rig.friction),
+    Stage("speed control", _UNIT, "speed_ref, torque_voltage below the supply's limit",
+          "gain and zero by direction", loops.unit_gains),
+    Stage("set points", _UNIT, "speed_ref of a motion", "ramp and speeds", loops.set_points),
+    Stage("drive", _UNIT, "torque_current, motor_speed, load of a motion under drive",
+          "motor, train, inertia; runs of the motions correct them", drive),
+    Stage("lock", _UNIT, "state of the lock, or its switch, and the ram's position",
+          "travels of the lock", lock.travels),
+    Stage("brake", _UNIT, "a rig against the set brake; the brake's switch",
+          "torque and delays", lock.brake),
+    Stage("motor", _PRELOAD, "torque_voltage, torque_current in motion",
+          "voltage constant, resistance", motor.motor_constants),
+    Stage("load side", _PRELOAD, "load and load_cell in motion",
+          "mass, damping, friction of the load", motor.load_side),
+    Stage("torque", _PRELOAD, "torque_current, load in motion both ways",
+          "inertia, friction, preload, efficiencies", screw.torque),
+    Stage("position loop", _PRELOAD, "command, motor_position, speed_ref",
+          "gain, feed-forward", loops.position_loop),
+    Stage("speed loop", _PRELOAD, "speed_ref, current_ref", "gain, integral time",
+          loops.speed_control),
+    Stage("loops by current", _PRELOAD, "command, motor_position, torque_current",
+          "gains where no set point was logged", loops_by_current),
+    Stage("heat", _PRELOAD, "temperatures over minutes", "thermal networks", heat),
+)  # fmt: skip
+#: What no log of these roles shows.
+_NEVER = {
+    _UNIT: {
+        "motor.bearing_torque": "the rig shows it only within the whole train's friction (FFM)",
+        "friction.breakaway_ratio": "the rig imposes the motion: nothing breaks away",
+        "lock.stiffness": "the seat deflects by less than the position's noise",
+        "lock.strength": "nothing broke",
+        "lock.spring_force": "the sleeve's spring and the screw's efficiency slow the nut alike",
+        "lock.travel": "the nut stops before it",
+        "screw.efficiency_force": "its loss bends too little over the loads to tell it from both "
+        "ends",
+        "gear.efficiency_first": "only the product with the screw's efficiency shows",
+        "gear.efficiency_second": "only the product with the screw's efficiency shows",
+        "leg.inertia": "changes the torque as a hundredth of the motor's own inertia would",
+    },
+    _PRELOAD: {
+        "friction.static": "a reversal breaks away within a sample or two",
+        "backlash.total": "both positions are read on one side of the joint, or too coarsely",
+        "backlash.stiffness": "the joint deflects by less than the corners' own error",
+        "control.current_limit": "the logs do not reach this limit for long",
+        "control.speed_limit": "the logs do not reach this limit",
+        "inverter.supply_voltage": "the logs do not reach this limit",
+        "control.torque_constant": "the drive's own belief: only its product with the gain shows",
+        "screw.inertia": "turns with the motor's own",
+        "screw.nut_heat_share": "scales the nut's capacity and its resistance alike",
+        "thermal.emissivity": "near the air's temperature radiation looks like convection",
+    },
+}
+#: What values stand on.
+_GIVEN = {
+    _UNIT: {
+        "lock.engage_travel": ("proximity.delay",),
+        "lock.release_travel": ("proximity.delay",),
+        "motor.inertia": ("screw.inertia", "gear.inertia_first", "gear.inertia_second"),
+        "screw.efficiency_unloaded": ("gear.efficiency_first", "gear.efficiency_second"),
+        "screw.efficiency_loaded": ("screw.efficiency_force",),
+    },
+    _PRELOAD: {
+        "control.speed_gain": ("control.torque_constant",),
+        "motor.inertia": ("screw.inertia",),
+        "thermal.winding_mass": ("thermal.winding_heat",),
+        "thermal.convection": ("thermal.area", "thermal.emissivity"),
+        "screw.nut_capacity": ("screw.nut_heat_share",),
+        "screw.nut_to_air": ("screw.nut_heat_share",),
+    },
+}
+
+
+@one_blas_thread()
+def calibrate_parts(
+    logs: Sequence[Log],
+    actuator: Actuator,
+    *,
+    free: Sequence[str] | None = None,
+    fidelity: str | None = "auto",
+    progress: Progress | None = None,
+) -> Calibration:
+    """Estimate each number from the signals that show it.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Motions under drive, of a friction rig, or long ones with temperatures.
+    actuator : Actuator
+        Values before; those that are not estimated stay.
+    free : sequence of str, optional
+        Paths to estimate; default: all that the logs determine.
+    fidelity : {"auto", "low", "high"}, optional
+        Of the runs of the logs' motions that correct the balances of an actuator with a control
+        unit; ``auto``: the switching model where the logs have its ripple, else the reduced-order
+        one. None: no runs are made.
+    progress : callable, optional
+        Told the done fraction; returns False to stop.
+
+    Raises
+    ------
+    InputError
+        No log, an unknown fidelity, nothing determined, or a path requested that the logs do not
+        determine.
+    Interrupted
+        `progress` returned False.
+    """
+    begin = clock.perf_counter()
+    if not logs:
+        raise InputError("calibration needs at least one log")
+    if fidelity not in {None, *_FIDELITIES}:
+        raise unknown("fidelity", str(fidelity), _FIDELITIES, "--fidelity")
+    for path in free or ():
+        record_of(actuator.wiring, path, "--free")
+    context = Context(logs, actuator, fidelity=fidelity, progress=progress)
+    _run(context)
+    estimates, undetermined = context.answer(free)
+    values: dict[str, str | float] = {item.path: item.value for item in estimates}
+    context.go(1.0)
+    return Calibration(
+        actuator=actuator.with_values(values, source="calibration"),
+        before=actuator,
+        logs=log_facts(context.logs),
+        parameters=by_path(estimates),
+        undetermined=undetermined,
+        facts=context.facts,
+        wall_s=clock.perf_counter() - begin,
+    )
+
+
+def _run(context: Context) -> None:
+    """Run the stages that serve this actuator."""
+    known = records(context.actuator.wiring)
+    for of in _NEVER.keys() & known.keys():
+        context.reasons |= _NEVER[of]
+        context.given |= _GIVEN[of]
+    if _UNIT in known:
+        context.facts["kinds"] = {
+            log.name: "rig" if rig_moves(log) else "motion" if moves_of(log) else "rest"
+            for log in context.logs
+        }
+    run_stages(STAGES, context, 0.05, 0.95)

@@ -1,0 +1,242 @@
+"""Loops from their own set points: gain and integral action of the speed's, the position's gain.
+
+``y = K e + K z (integral of e)`` holds exactly wherever the output is not limited; each stretch
+between two limits begins with an integral of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from elevon.arrays import Floats
+from elevon.calibrate.stages.context import Context
+from elevon.calibrate.stages.moves import moves_of
+from elevon.calibrate.stages.smooth import quick
+from elevon.estimate import Estimate
+from elevon.estimate.regression import Regression, regressed
+from elevon.logs.log import Log
+
+__all__ = [
+    "UNIT_NEEDS",
+    "position_loop",
+    "set_points",
+    "speed_control",
+    "stretches",
+    "unit_gains",
+    "with_starts",
+]
+
+Bools = npt.NDArray[np.bool_]
+_COLUMNS = ("gain", "integral", "set_point", "ramp")
+_SHORTEST = 100  # samples of a stretch
+_READING = 2.5e-4  # s between the speed that the unit has read and the one that is recorded
+_TOP = 0.98  # of the largest value: the set point is limited
+_EDGE = 0.05  # s at both ends of a log
+_FEWEST = 200  # samples of the position loop
+#: Roles that the gains of a control unit need.
+UNIT_NEEDS = ("speed_ref", "torque_voltage")
+_START = 0.15  # s after the drive begins, and ...
+_END = 0.05  # ... before it ends: filters of the recorder reach over both
+_SUPPLY = 0.99  # of the supply, from which the demand is limited
+_SLOPE = 0.5  # of the usual change, about it: the set point is on its ramp
+_STANDING = 1e-3  # of the ramp: the set point stands
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """A log's set point, speed and output, and the samples that count: one stretch."""
+
+    time: Floats
+    period: float
+    set_point: Floats
+    speed: Floats
+    output: Floats
+    used: Bools
+
+
+def stretches(inside: Bools) -> list[Bools]:
+    """Return the contiguous runs of samples that are long enough."""
+    number = np.cumsum(np.diff(inside.astype(int), prepend=0) == 1)
+    runs = [inside & (number == k) for k in range(1, int(number[-1]) + 1)]
+    return [used for used in runs if used.sum() >= _SHORTEST]
+
+
+def _speed_loop(parts: Sequence[_Stretch], tick: float) -> Regression | None:
+    """Fit gain and integral; None without stretches.
+
+    The set point and its ramp are columns of their own: what its reading at another instant than
+    the speed's adds.
+    """
+    rows, data, strokes = [], [], []
+    for part in parts:
+        h = part.period
+        error = part.set_point - part.speed
+        # The unit adds the error of each tick at once: half a tick more than the integral.
+        total = np.cumsum(error) * h - 0.5 * h * error + 0.5 * tick * error
+        ramp = np.gradient(part.set_point, h)
+        rows.append(np.stack([error, total, part.set_point, ramp], axis=1)[part.used])
+        data.append(part.output[part.used])
+        strokes.append((part.time[part.used], np.ones(int(part.used.sum())), h))
+    if not rows:
+        return None
+    names = (*_COLUMNS, *(f"start{k}" for k in range(len(rows))))
+    return regressed(names, with_starts(rows), data, strokes, robust=False)
+
+
+def with_starts(rows: Sequence[Floats]) -> list[Floats]:
+    """Return the columns of stretches with one more for the start of each."""
+    each = np.eye(len(rows))
+    return [np.hstack([row, np.tile(each[k], (len(row), 1))]) for k, row in enumerate(rows)]
+
+
+def _gain_and_zero(fit: Regression) -> tuple[Estimate, Estimate]:
+    """Return the gain and the zero (one over the integral time) of a fit."""
+    gain, zero = fit.estimate("gain"), fit.of(lambda b: float(b[1] / b[0]))
+    # A speed read earlier or later than it is recorded adds to the gain what the integral makes of
+    # it.
+    late = abs(fit["integral"]) * _READING
+    return gain.widened(late), zero.widened(late * zero.value / gain.value)
+
+
+def position_loop(ctx: Context) -> None:
+    """Gain and feed-forward of the position loop: speed set point over error and command."""
+    paths = ("control.position_gain", "control.speed_feedforward")
+    usable = [
+        log for log in ctx.logs
+        if quick(log) and log.has("command", "speed_ref", "motor_position")
+        and float(np.ptp(log["command"])) > 0.0
+    ]  # fmt: skip
+    value, ratio = ctx.given_value, ctx.ratio
+    rows, data, strokes = [], [], []
+    for log in usable:
+        used = _free(log, "speed_ref", value("control.speed_limit"))
+        error = log["command"] - log["motor_position"] / ratio
+        ahead = ratio * np.gradient(log["command"], log.period)
+        bend = np.gradient(ahead, log.period)
+        # A corner of the command lies between two samples.
+        used &= np.abs(bend) < 10.0 * (np.median(np.abs(bend)) + 1.0)
+        columns = [error, ahead, bend, np.ones(len(error))]
+        rows.append(np.stack(columns, axis=1)[used])
+        data.append(log["speed_ref"][used])
+        strokes.append((log.time[used], log["motor_speed"][used], log.period))
+    if sum(len(row) for row in rows) < _FEWEST:
+        why = "needs the command, the motor's position and the set point of the speed"
+        ctx.add({}, dict.fromkeys(paths, why))
+        return
+    fit = regressed(("gain", "ahead", "bend", "offset"), rows, data, strokes)
+    # A command read a tick earlier or later than it is recorded moves the error.
+    late = value("control.sample_time") * fit["gain"] * abs(1.0 - fit["ahead"])
+    levels = {
+        paths[0]: fit.estimate("gain").widened(1e-3 * fit["gain"]),
+        paths[1]: fit.estimate("ahead").widened(late + 1e-3),
+    }
+    why = "the set point does not follow the position's error"
+    ctx.add(levels if fit["gain"] > 0.0 else {}, dict.fromkeys(paths, why))
+
+
+def _free(log: Log, role: str, limit: float) -> Bools:
+    """Samples at which a set point is not at its limit, apart from the ends."""
+    size = np.abs(log[role])
+    top = min(float(np.max(size)), limit)
+    limited = size > _TOP * limit if top < _TOP * limit else size > _TOP * top
+    edge = (log.time < _EDGE) | (log.time > log.time[-1] - _EDGE)
+    return np.asarray(~limited & ~edge)
+
+
+def speed_control(ctx: Context) -> None:
+    """Gain and integral time of a servo's speed loop: current set point over the speed's error."""
+    paths = ("control.speed_gain", "control.integral_time")
+    value = ctx.given_value
+    parts = []
+    for log in ctx.logs:
+        if not (quick(log) and log.has("speed_ref", "current_ref")):
+            continue
+        inside = _free(log, "current_ref", value("control.current_limit"))
+        torque = value("control.torque_constant") * log["current_ref"]
+        parts += _stretched(log, torque, inside)
+    fit = _speed_loop(parts, value("control.sample_time"))
+    if fit is None:
+        ctx.add({}, dict.fromkeys(paths, "needs the set points of speed and current"))
+    elif not (fit["gain"] > 0.0 and fit["integral"] > 0.0):
+        ctx.add({}, dict.fromkeys(paths, "the set point does not follow the speed's error"))
+    else:
+        gain, zero = _gain_and_zero(fit)
+        ctx.add({paths[0]: gain, paths[1]: zero.inverted()})
+
+
+def unit_gains(ctx: Context) -> None:
+    """Gain and zero of a control unit's speed control, by direction: demand over error."""
+    for name, extending in (("extension", True), ("retraction", False)):
+        paths = [f"control.gain_{name}", f"control.zero_{name}"]
+        complete = [log for log in ctx.logs if any(m.extending == extending for m in moves_of(log))]
+        usable = [log for log in complete if log.has(*UNIT_NEEDS)]
+        parts = [part for log in usable for part in _driven(log, extending=extending)]
+        fit = _speed_loop(parts, ctx.given_value("control.period"))
+        if fit is not None and fit["gain"] > 0.0 and fit["integral"] > 0.0:
+            ctx.add(dict(zip(paths, _gain_and_zero(fit), strict=True)))
+            continue
+        why = f"no log of a motion in {name}"
+        if complete:
+            why = "the logs show no set point of the speed, or no demanded voltage"
+        if usable:
+            why = "the demand is at the supply's limit throughout"
+        ctx.add({}, dict.fromkeys(paths, why))
+
+
+def _driven(log: Log, *, extending: bool) -> list[_Stretch]:
+    """Stretches of all motions in one direction in which the demand is not limited."""
+    parts = []
+    for move in moves_of(log):
+        if move.extending == extending:
+            inside = (log.time > move.begin + _START) & (log.time < move.end - _END)
+            if log.has("supply_voltage"):
+                inside &= np.abs(log["torque_voltage"]) < _SUPPLY * log["supply_voltage"]
+            parts += _stretched(log, log["torque_voltage"], inside)
+    return parts
+
+
+def _stretched(log: Log, output: Floats, inside: Bools) -> list[_Stretch]:
+    signals = (log["speed_ref"], log["motor_speed"], output)
+    return [_Stretch(log.time, log.period, *signals, used) for used in stretches(inside)]
+
+
+def set_points(ctx: Context) -> None:
+    """The set point's ramp and its two levels, as the unit shows them."""
+    slopes: list[float] = []
+    levels: dict[str, list[float]] = {"high": [], "low": []}
+    for log in ctx.logs:
+        if not log.has("speed_ref"):
+            continue
+        for move in moves_of(log):
+            inside = (log.time >= move.begin) & (log.time <= move.end)
+            target = np.abs(log["speed_ref"][inside])
+            if len(target) < 50:
+                continue
+            change = np.diff(target) / log.period
+            moving = np.abs(change[change != 0.0])
+            if not len(moving):
+                continue
+            # A jump (the unit starts afresh) is no ramp, a sample half on the ramp neither.
+            typical = float(np.median(moving))
+            slopes.append(float(np.median(moving[np.abs(moving - typical) < _SLOPE * typical])))
+            steady = target[1:][np.abs(change) < _STANDING * typical]
+            steady = steady[steady > 0.0]
+            if len(steady):
+                levels["high"].append(float(np.max(steady)))
+                levels["low"].append(float(np.min(steady)))
+    result = {"control.acceleration_limit": _level(slopes)} if slopes else {}
+    if levels["high"] and max(levels["high"]) > 1.05 * min(levels["low"]):
+        result |= {f"control.speed_{name}": _level(values) for name, values in levels.items()}
+    paths = ("control.acceleration_limit", "control.speed_high", "control.speed_low")
+    ctx.add(result, dict.fromkeys(paths, "no motion with the set point of the speed recorded"))
+
+
+def _level(values: Sequence[float]) -> Estimate:
+    """Median of what several motions show; a number the unit writes itself."""
+    middle = float(np.median(values))
+    spread = float(np.std(values)) / np.sqrt(len(values))
+    return Estimate(middle, max(spread, 1e-4 * middle))

@@ -1,0 +1,201 @@
+"""Torque balance of a preloaded screw: friction, preload, efficiency in each direction, inertia.
+
+``k_T i = J dw/dt + C w + s (T_d + b(F) T_pr) + r F + s L(F)`` with ``s`` the sign of the motion,
+``T_pr = F_pr r (1/eta - eta')``, ``L = (1/eta - 1) r |F|`` where the force ``F`` on the nut opposes
+the motion and ``(1 - eta') r |F|`` where it aids. ``b`` is the relieved half's share of preload: 1
+without load, 0 from 2.83 F_pr on (docs/theory/ballscrew.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.calibrate.stages.context import Context
+from elevon.calibrate.stages.motor import flux_factor
+from elevon.calibrate.stages.smooth import CORNERS, apart, loaded, quick, smooth
+from elevon.estimate import Estimate, Free
+from elevon.estimate.covariance import Strokes
+from elevon.estimate.residual import BalanceFit, fit_balance
+from elevon.logs.log import Log
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["nut_force", "nut_loss", "relieved", "torque"]
+
+#: What is believed before the logs, as a share of the actuator file's value.
+_BELIEF = {
+    "motor.inertia": 0.7, "friction.viscous": 3.0, "friction.dynamic": 1.0, "screw.preload": 1.0,
+    "screw.efficiency": 0.15, "screw.efficiency_aiding": 0.15,
+}  # fmt: skip
+_NAMES = tuple(_BELIEF)
+#: What the current's sensor adds: offset [A], and lag [s] behind the motion; first value and share.
+_SENSOR = {"offset": (0.1, 1.0), "lag": (1e-3, 3.0)}
+_SPREAD = 0.05  # N m, first deviation of the residual
+_CLOSES = 5e-5  # of the torque: ASSUMED, to which smoothed channels' balance closes at any speed
+_NUDGE = 1e-3  # of the torque, for what its deviation moves
+_RELIEF = 2.0 * np.sqrt(2.0)
+_SERIES = (1.53960, -1.19476, 1.13376, -0.67106, 0.19246)
+
+
+@dataclass(frozen=True)
+class TorqueBalance:
+    """What the balance determines, why it does not the rest, and its residual [N m]."""
+
+    levels: dict[str, Estimate]
+    reasons: dict[str, str]
+    residual: float
+
+
+def relieved(force: Floats, preload: float) -> Floats:
+    """Return the relieved half's share of the preload, as the core's series has it."""
+    y = np.clip(1.0 - np.abs(force) / (_RELIEF * preload), 0.0, 1.0)
+    root = np.sqrt(y)
+    series = sum(c * root**k for k, c in enumerate(_SERIES))
+    return np.asarray(y * root * series)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    current: Floats
+    current_slope: Floats
+    acceleration: Floats
+    speed: Floats
+    force: Floats
+    travel: float
+    other_inertia: float
+
+    def torque(self, value: Floats) -> Floats:
+        """Torque that the motor must make [N m], for values of `_NAMES` without the sensor's."""
+        inertia, viscous, dry, preload, opposing, aiding = value[: len(_NAMES)]
+        direction, load = np.sign(self.speed), np.abs(self.force) * self.travel
+        lost = np.where(direction * self.force > 0.0, 1.0 / opposing - 1.0, 1.0 - aiding) * load
+        drag = preload * self.travel * (1.0 / opposing - aiding) * relieved(self.force, preload)
+        smooth = (inertia + self.other_inertia) * self.acceleration + viscous * self.speed
+        return np.asarray(smooth + self.travel * self.force + direction * (dry + drag + lost))
+
+
+def torque(ctx: Context) -> None:
+    """Fit the screw to all logs with motion, current and force.
+
+    The torque of an ampere is the motor's as determined, else as the actuator file has it; where no
+    cell measures the force on the nut, the load side's numbers count.
+    """
+    known = ctx.levels.get("motor.emf_constant")
+    constant = None if known is None else known.scaled(1.5)
+    if constant is None:
+        ctx.stands_on(_NAMES, ("motor.emf_constant",))
+    balance = _balance(ctx.logs, ctx.settled(), constant)
+    ctx.add(balance.levels, balance.reasons)
+    residual = balance.residual
+    ctx.facts["balance_residual_nm"] = None if np.isnan(residual) else residual
+
+
+def _balance(logs: Sequence[Log], actuator: Actuator, constant: Estimate | None) -> TorqueBalance:
+    usable = [log for log in logs if quick(log) and loaded(log)]
+    names = _NAMES
+    if not usable:
+        why = "no log of a motion with current and force on the ram"
+        return TorqueBalance({}, dict.fromkeys(names, why), float("nan"))
+    value = actuator.parameters.value
+    given = 1.5 * value("motor.emf_constant")
+    scale = given if constant is None else constant.value
+    free = [
+        *(Free.about(path, max(value(path), 1e-9), share) for path, share in _BELIEF.items()),
+        *(Free.about(name, *pair, signed=True) for name, pair in _SENSOR.items()),
+    ]
+
+    def fitted(torque: float, corner: float = CORNERS[0]) -> BalanceFit:
+        samples, strokes = _stacked(usable, actuator, corner)
+
+        def model(value: Floats) -> Floats:
+            late = value[7] * samples.current_slope
+            return np.asarray(samples.torque(value) / torque + value[6] - late)
+
+        return fit_balance(free, samples.current, model, strokes, scale=_SPREAD / torque)
+
+    fit = fitted(scale)
+    # How near to the reversals samples count is open.
+    others = [fitted(scale, CORNERS[1]).x - fit.x]
+    if constant is not None:
+        moved = (fitted(scale * (1.0 + _NUDGE)).x - fit.x) / _NUDGE
+        others.append(moved * constant.std / constant.value)
+    samples = _stacked(usable, actuator, CORNERS[0])[0]
+    return _judged(fit.widened(*others), samples, scale)
+
+
+def _stacked(
+    logs: Sequence[Log], actuator: Actuator, corner: float
+) -> tuple[_Samples, list[Strokes]]:
+    value = actuator.parameters.value
+    travel = value("screw.lead") / value("gear.ratio")
+    rows: dict[str, list[Floats]] = {
+        "current": [], "current_slope": [], "acceleration": [], "speed": [], "force": [],
+    }  # fmt: skip
+    strokes = []
+    for log in logs:
+        s, used = smooth(log), apart(log, corner)
+        rows["current"].append((flux_factor(log, actuator) * s["torque_current"])[used])
+        rows["current_slope"].append(s["current_slope"][used])
+        rows["acceleration"].append(s["acceleration"][used])
+        rows["speed"].append(s["motor_speed"][used])
+        rows["force"].append(nut_force(log, actuator)[used])
+        strokes.append((log.time[used], s["motor_speed"][used], log.period))
+    joined = {name: np.concatenate(parts) for name, parts in rows.items()}
+    other_inertia = value("gear.inertia") + value("screw.inertia") / value("gear.ratio") ** 2
+    return _Samples(travel=travel, other_inertia=other_inertia, **joined), strokes
+
+
+def nut_force(log: Log, actuator: Actuator) -> Floats:
+    """Force on the nut, positive against extension: the cell's, else the load and its side's."""
+    s, value = smooth(log), actuator.parameters.value
+    if log.has("load_cell"):
+        return s["load_cell"]
+    travel = value("screw.lead") / value("gear.ratio")
+    speed, acceleration = travel * s["motor_speed"], travel * s["acceleration"]
+    side = value("load.mass") * acceleration + value("load.damping") * speed
+    return np.asarray(s["load"] + side + value("load.friction") * np.sign(speed))
+
+
+def nut_loss(speed: Floats, force: Floats, actuator: Actuator) -> Floats:
+    """Heat that the screw makes of its load and its preload [W]."""
+    value = actuator.parameters.value
+    travel = value("screw.lead") / value("gear.ratio")
+    opposing, aiding = value("screw.efficiency"), value("screw.efficiency_aiding")
+    lost = np.where(speed * force > 0.0, 1.0 / opposing - 1.0, 1.0 - aiding) * np.abs(force)
+    preload = value("screw.preload")
+    drag = preload * (1.0 / opposing - aiding) * relieved(force, preload)
+    return np.asarray(travel * (lost + drag) * np.abs(speed))
+
+
+def _judged(fit: BalanceFit, samples: _Samples, scale: float) -> TorqueBalance:
+    levels, reasons = fit.judged(lambda path: _why(path, samples), _NAMES)
+    if viscous := levels.get("friction.viscous"):
+        # Viscous torque may be half a hundredth of all: what the balance leaves open counts.
+        open_ = _CLOSES * _rms(samples.torque(fit.values)) / _rms(samples.speed)
+        levels["friction.viscous"] = viscous.widened(open_)
+    opposing, aiding = levels.get("screw.efficiency"), levels.get("screw.efficiency_aiding")
+    if opposing is not None and aiding is not None and aiding.value > opposing.value:
+        # No screw gives back more than it takes: the difference is noise.
+        levels["screw.efficiency_aiding"] = Estimate(opposing.value, aiding.std, aiding.degrees)
+    return TorqueBalance(levels, reasons, fit.residual * scale)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _why(name: str, samples: _Samples) -> str:
+    direction = np.sign(samples.speed) * samples.force
+    if name == "screw.efficiency" and float(np.max(direction)) < 500.0:
+        return "no force that opposes the motion"
+    if name == "screw.efficiency_aiding" and float(np.min(direction)) > -500.0:
+        return "no force that aids the motion"
+    if name in ("screw.preload", "friction.dynamic"):
+        return "drag and dry friction are separated by forces on both sides of the relief only"
+    return "the logs' noise is larger than its effect"

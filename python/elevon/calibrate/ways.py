@@ -1,0 +1,322 @@
+"""The ways of calibration: each reads logs, fits, holds logs out and validates in its manner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+from elevon.calibrate.outcome import Calibration
+from elevon.calibrate.stages.choice import balanced, preloaded
+from elevon.calibrate.validation import Validation
+from elevon.errors import ElevonError, InputError
+from elevon.logs.drive import drive_log
+from elevon.logs.log import Log
+from elevon.progress import Progress, part
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.recording import Recording
+
+__all__ = ["CalibrationRequest", "CalibrationWay", "turns", "way_of"]
+
+_LONG = 120.0  # s: a log of temperatures is no log of a motion to be predicted
+_NOT_COMPARED = "a log lacks a position: the closed loop is not compared"
+_FROM_THE_FIT = "thresholds: from the fit itself, since no log could be held out"
+
+
+@dataclass(frozen=True)
+class CalibrationRequest:
+    """What is to be estimated; see `elevon.calibrate.door.calibrate`."""
+
+    free: Sequence[str] | None = None
+    per_log: Sequence[str] = ()
+    fidelity: str | None = None
+    transient: float | None = None
+    promise: bool = False
+
+
+class CalibrationWay(Protocol):
+    """Logs of one kind, ready to be calibrated to and validated with."""
+
+    def calibrate(
+        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
+    ) -> Calibration:
+        """Estimate what the logs determine."""
+
+    def validate(
+        self,
+        actuator: Actuator,
+        fidelity: str,
+        transient: float | None,
+        progress: Progress | None,
+    ) -> Validation:
+        """Hold an actuator against the logs."""
+
+
+def way_of(logs: Sequence[Log], actuator: Actuator, *, validating: bool = False) -> CalibrationWay:
+    """Return the way that suits an actuator's records and the roles of its logs.
+
+    Raises
+    ------
+    InputError
+        Logs that no way can read.
+    """
+    from elevon.parameters.records import wirings
+
+    if "position" not in wirings()[actuator.wiring]["modes"]:
+        return _Balances(logs, unit=True)
+    if not validating and preloaded(actuator) and balanced(logs):
+        return _Balances(logs, unit=False)
+    if not turns(actuator):
+        return _ClosedLoop(logs)
+    try:
+        read = [drive_log(log) for log in logs]
+    except InputError as error:
+        loop = _ClosedLoop(logs, f"in closed loop, since {error}")
+        try:
+            loop.logs  # noqa: B018 - read here, for the better of two errors
+        except InputError:
+            raise error from None
+        return loop
+    _check_rates(logs)
+    return _Signals(read)
+
+
+def _check_rates(logs: Sequence[Log]) -> None:
+    """Refuse signals of two rates: what is fitted to both counts samples."""
+    first = logs[0]
+    for log in logs[1:]:
+        if abs(log.period - first.period) > 0.01 * first.period:
+            raise InputError(
+                f"{first.name} runs at {1.0 / first.period:.4g} Hz, {log.name} at "
+                f"{1.0 / log.period:.4g} Hz; logs used together must have one rate"
+            )
+
+
+def turns(actuator: Actuator) -> bool:
+    """Whether the actuator is a servo whose output turns: its positions give the backlash."""
+    from elevon.parameters.records import wirings
+    from elevon.scenario.compile import signal_records
+
+    position = signal_records(actuator.wiring, "high").get("output_position", {})
+    return "position" in wirings()[actuator.wiring]["modes"] and position.get("unit") == "rad"
+
+
+@dataclass(frozen=True)
+class _Signals:
+    """Set point, speed and current of a turning servo: regressions on the signals."""
+
+    logs: Sequence[Log]
+
+    def calibrate(
+        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
+    ) -> Calibration:
+        from elevon.calibrate.calibration import calibrate
+
+        result = calibrate(
+            self.logs, actuator, free=request.free, per_log=request.per_log,
+            fidelity=request.fidelity or "low", transient=request.transient,
+            progress=part(progress, 0.0, 0.8),
+        )  # fmt: skip
+        result = self._compared(result, request.transient)
+        if not request.promise or result.validation is None:
+            return replace(result, promise=result.validation)
+        return self._held_out(result, request.free, part(progress, 0.85, 1.0))
+
+    def _compared(self, result: Calibration, transient: float | None) -> Calibration:
+        """Old and new values in closed loop on the same logs, where positions were logged."""
+        from elevon.calibrate.validation import validate
+
+        if any(not log.has("output_position", "motor_position") for log in self.logs):
+            return _with(result, _NOT_COMPARED)
+        try:
+            after = validate(self.logs, result.actuator, transient=transient)
+            before = validate(self.logs, result.before, transient=after.transient)
+        except InputError as error:
+            return _with(result, f"the closed loop is not compared: {error}")
+        return replace(result, validation_before=before, validation=after)
+
+    def _held_out(
+        self, result: Calibration, free: Sequence[str] | None, progress: Progress | None
+    ) -> Calibration:
+        from elevon.calibrate.promise import held_out_agreement
+        from elevon.calibrate.thresholds import outliers
+
+        after = result.validation
+        assert after is not None
+        agreement = held_out_agreement(self.logs, result.before, free, after, progress)
+        if agreement is None:
+            return _with(replace(result, promise=after), _FROM_THE_FIT)
+        apart = "predicted far worse than the other logs; the thresholds leave it out"
+        texts = [f"{name}: {apart}" for name in outliers(agreement)]
+        return _with(replace(result, promise=agreement), *texts)
+
+    def validate(
+        self,
+        actuator: Actuator,
+        fidelity: str,
+        transient: float | None,
+        progress: Progress | None,
+    ) -> Validation:
+        from elevon.calibrate.validation import validate
+
+        return validate(
+            self.logs, actuator, fidelity=fidelity, transient=transient, progress=progress
+        )
+
+
+@dataclass(frozen=True)
+class _ClosedLoop:
+    """Few channels: a servo's loop run on the logged command."""
+
+    given: Sequence[Log]
+    why: str = ""
+
+    @cached_property
+    def logs(self) -> list[Log]:
+        from elevon.calibrate.closed_loop import loop_log
+
+        return [loop_log(log) for log in self.given]
+
+    def calibrate(
+        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
+    ) -> Calibration:
+        from elevon.calibrate.closed_loop import calibrate_loop
+        from elevon.calibrate.closed_loop.predict import validate_loop
+
+        _check_loop(actuator, request)
+        result = calibrate_loop(
+            self.logs, actuator, free=request.free, transient=request.transient, progress=progress
+        )
+        offsets = None if result.promise is None else result.promise.offsets
+        after = validate_loop(self.logs, result.actuator, request.transient, offsets)
+        return _with(replace(result, validation=after), *filter(None, [self.why]))
+
+    def validate(
+        self,
+        actuator: Actuator,
+        fidelity: str,  # noqa: ARG002 - its runs are of the low one
+        transient: float | None,
+        progress: Progress | None,  # noqa: ARG002 - a few runs
+    ) -> Validation:
+        from elevon.calibrate.closed_loop.predict import validate_loop
+
+        return validate_loop(self.logs, actuator, transient)
+
+
+def _check_loop(actuator: Actuator, request: CalibrationRequest) -> None:
+    """Refuse what the closed loop has no meaning for."""
+    from elevon.simulate.prepare import check_fidelity
+
+    fidelity = request.fidelity or "low"
+    check_fidelity(actuator.wiring, fidelity)
+    if fidelity != "low":
+        raise InputError(
+            f"--fidelity {fidelity}: the closed loop is searched over some 10 000 runs, which are "
+            "of the low fidelity; leave it out, and validate the set with elevon compare"
+        )
+    if request.per_log:
+        raise InputError(
+            "--per-log: these logs have no two positions and set points to estimate each log's "
+            "backlash from; leave it out"
+        )
+
+
+@dataclass(frozen=True)
+class _Balances:
+    """Each number from its own balance; `unit`: of an actuator with a control unit of its own."""
+
+    given: Sequence[Log]
+    unit: bool
+
+    def calibrate(
+        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
+    ) -> Calibration:
+        from elevon.calibrate.stages import calibrate_parts
+
+        result = calibrate_parts(
+            self._read(self.given, actuator), actuator, free=request.free,
+            fidelity=(request.fidelity or "auto") if self.unit else "auto",
+            progress=part(progress, 0.0, 0.3 if request.promise else 1.0),
+        )  # fmt: skip
+        if request.transient is not None or (request.fidelity and not self.unit):
+            text = "--transient, and --fidelity without model runs: not used for these logs"
+            result = _with(result, text)
+        return self._held_out(result, request) if request.promise else result
+
+    @staticmethod
+    def _read(logs: Sequence[Log], actuator: Actuator) -> list[Log]:
+        from elevon.calibrate.stages import role_log
+
+        return [role_log(_recording(log), log.name, actuator) for log in logs]
+
+    def _predicted(self, actuator: Actuator) -> list[str]:
+        """Names of the logs of motions that the model can predict."""
+        from elevon.calibrate.stages.moves import moves_of
+
+        return [
+            log.name
+            for log in self._read(self.given, actuator)
+            if (moves_of(log) if self.unit else log.has("command") and log.duration < _LONG)
+        ]
+
+    def _held_out(self, result: Calibration, request: CalibrationRequest) -> Calibration:
+        """Thresholds of the actuator file, from motions held out where there are several."""
+        from elevon.calibrate.parts_held_out import held_out_logs
+        from elevon.calibrate.stages import calibrate_parts
+
+        by_name = {log.name: log for log in self.given}
+        names = self._predicted(result.before)
+        if not names:
+            return _with(result, "no thresholds: no log of a motion to be predicted")
+        fidelity = (request.fidelity or "auto") if self.unit else "auto"
+
+        def without(name: str) -> Actuator:
+            others = [log for log in by_name.values() if log.name != name and _ends(log) < _LONG]
+            read = self._read(others, result.before)
+            return calibrate_parts(
+                read, result.before, free=request.free, fidelity=fidelity
+            ).actuator
+
+        def validated(name: str, fitted: Actuator, progress: Progress | None) -> Validation:
+            way = replace(self, given=[by_name[name]])
+            return way.validate(fitted, "low", None, progress)
+
+        try:
+            promise, apart = held_out_logs(names, result.actuator, without, validated)
+        except ElevonError as error:
+            return _with(result, f"no thresholds: {error}")
+        return _with(replace(result, promise=promise), *([] if apart else [_FROM_THE_FIT]))
+
+    def validate(
+        self,
+        actuator: Actuator,
+        fidelity: str,
+        transient: float | None,
+        progress: Progress | None,
+    ) -> Validation:
+        from elevon.calibrate.replay import validate_replay
+
+        if not self.unit:
+            return _ClosedLoop(self.given).validate(actuator, fidelity, transient, progress)
+        named = [(log.name, _recording(log)) for log in self.given]
+        return validate_replay(
+            named, actuator, fidelity=fidelity, transient=transient, progress=progress
+        )
+
+
+def _with(result: Calibration, *texts: str) -> Calibration:
+    """Return the answer with something more to know."""
+    return replace(result, findings=(*result.findings, *texts))
+
+
+def _ends(log: Log) -> float:
+    return float(log.time[-1] - log.time[0])
+
+
+def _recording(log: Log) -> Recording:
+    if log.recording is None:
+        raise InputError(f"{log.name}: was changed since it was read; read it again")
+    return log.recording

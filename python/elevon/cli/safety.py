@@ -1,0 +1,69 @@
+"""`elevon safety`: the control unit of an actuator under many failures, judged by hazards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elevon.cli.common import (
+    ActuatorArgument,
+    ForceOption,
+    JsonOption,
+    SeedOption,
+    SetOption,
+    check_outputs,
+    read_actuator,
+)
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+
+app = typer.Typer(rich_markup_mode=None)
+
+
+@app.command()
+def safety(
+    actuator: ActuatorArgument,
+    *,
+    every: Annotated[
+        int, typer.Option(min=1, help="Only each so-manieth situation: a short form.")
+    ] = 1,
+    settings: SetOption = None,
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for report.html and result.json.")
+    ] = None,
+    force: ForceOption = False,
+    date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
+) -> int:
+    """Run every failure, pairs and triples of them in every situation; list the hazards left."""
+    import json as text
+
+    from elevon.files import write_text
+    from elevon.safety import safety as run
+    from elevon.safety.page import safety_report
+
+    pages = [] if out is None else [out / "report.html", out / "result.json"]
+    check_outputs(pages, force=force)
+    model = read_actuator(actuator, settings)
+    with progress_bar("safety campaign") as advance:
+        result = run(model, seed=seed, every=every, progress=advance)
+    values = result.to_dict()
+    if out is not None:
+        say(f"report: {safety_report(result, model, date=date).save(pages[0], force=force)}")
+        write_text(pages[1], text.dumps(values, indent=1) + "\n", force=force)
+    if json:
+        print_json(values)
+    else:
+        situations = sum(item["rows"] for item in values["hazards"])
+        answer(
+            f"{values['status'].upper()}: {situations} of {result.runs} situations show a hazard"
+        )
+        print_table(
+            ["hazard", "rows", "listed", "by one failure", "per hour"],
+            [[item["name"], *(str(item[key]) for key in ("rows", "listed", "single")),
+              f"{item['per_hour']:.1e}"] for item in values["hazards"]],
+            title="hazards",
+        )  # fmt: skip
+    return 0 if values["status"] == "pass" else 1

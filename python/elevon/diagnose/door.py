@@ -1,0 +1,182 @@
+"""The doors `elevon.diagnose` and `elevon.monitor`."""
+
+from __future__ import annotations
+
+import os
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from elevon.calibrate.ways import turns
+from elevon.diagnose.bymodel.answer import Diagnosis
+from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor, Monitoring
+from elevon.errors import InputError, unknown
+from elevon.logs.drive import drive_log
+from elevon.logs.read import as_logs
+from elevon.simulate.arguments import as_actuator
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.surrogate import Surrogate
+    from elevon.logs.log import Log
+    from elevon.logs.read import LogsLike
+    from elevon.simulate.arguments import ActuatorLike
+
+__all__ = ["METHODS", "diagnose", "monitor"]
+
+METHODS = ("model", "surrogate", "both")
+
+
+def diagnose(
+    logs: LogsLike,
+    actuator: ActuatorLike,
+    baselines: LogsLike = (),
+    *,
+    method: str = "model",
+    surrogate: Surrogate | str | os.PathLike[str] | None = None,
+    faults: Sequence[str] | None = None,
+    false_alarm: float = 0.05,
+) -> Diagnosis:
+    """Say what is wrong with the unit that wrote the logs, where, how bad, how sure.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of them
+        Of one unit in one condition.
+    actuator : Actuator, str or path
+        The healthy unit, calibrated.
+    baselines : Log, path, or sequence of them
+        Of the healthy unit; those of the same test serve.
+    method : str
+        ``model``; ``surrogate``; ``both``: the surrogate proposes, the model refines.
+    surrogate : Surrogate or path, optional
+        Default: the package's own.
+    faults : sequence of str, optional
+        ``KIND@PLACE`` of the candidates; default: all.
+    false_alarm : float
+        Rate at which a healthy unit may be called faulty.
+
+    Raises
+    ------
+    InputError
+        A log that cannot be diagnosed, no candidate, a rate outside 0 to 1, a method that does not
+        serve this actuator.
+    """
+    model = as_actuator(actuator)
+    run = _method(method, surrogate)
+    if not 0.0 < false_alarm < 1.0:
+        raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
+    by_positions = turns(model)
+    if method != "model" and not by_positions:
+        raise InputError(f"--method {method}: serves turning outputs; {model.name} has none")
+    data, healthy = as_logs(logs), _healthy(baselines)
+    if by_positions:
+        result = _by_model(run, data, model, healthy, faults=faults, false_alarm=false_alarm)
+        return replace(result, method=method)
+    return _by_roles(data, model, healthy, faults=faults, false_alarm=false_alarm)
+
+
+def _healthy(baselines: LogsLike) -> list[Log]:
+    none = not isinstance(baselines, (str, os.PathLike)) and isinstance(baselines, Sequence)
+    return [] if none and not len(baselines) else as_logs(baselines)  # type: ignore[arg-type]
+
+
+def _method(
+    method: str, given: Surrogate | str | os.PathLike[str] | None
+) -> Callable[..., Diagnosis]:
+    """Return what diagnoses; a surrogate's file is read before any log."""
+    if method not in METHODS:
+        raise unknown("method", method, METHODS, "--method")
+    if method == "model":
+        from elevon.diagnose.bymodel import diagnose as by_model
+
+        if given is not None:
+            raise InputError("--surrogate: serves --method surrogate and both")
+        return by_model
+    from elevon.diagnose.surrogate import (
+        Surrogate,
+        diagnose_by_both,
+        diagnose_by_surrogate,
+        shipped,
+    )
+
+    if not isinstance(given, Surrogate):
+        given = shipped() if given is None else Surrogate.load(given)
+    by = diagnose_by_surrogate if method == "surrogate" else diagnose_by_both
+    return partial(by, surrogate=given)
+
+
+def _by_model(
+    run: Callable[..., Diagnosis],
+    logs: Sequence[Log],
+    model: Actuator,
+    baselines: Sequence[Log],
+    **options: Any,
+) -> Diagnosis:
+    from elevon.diagnose.bymodel.traces import traces_of
+
+    data = [drive_log(log) for log in logs]
+    result = run(data, model, baselines=[drive_log(log) for log in baselines], **options)
+    return replace(result, actuator=model.name, draw=partial(traces_of, data, model, result))
+
+
+def _by_roles(
+    logs: Sequence[Log], model: Actuator, baselines: Sequence[Log], **options: Any
+) -> Diagnosis:
+    from elevon.diagnose.byroles import diagnose_by_roles
+    from elevon.diagnose.byroles.traces import traces_by_roles
+
+    result = diagnose_by_roles(logs, model, baselines=baselines, **options)
+    return replace(result, actuator=model.name, draw=partial(traces_by_roles, logs, model, result))
+
+
+def monitor(
+    logs: LogsLike,
+    actuator: ActuatorLike,
+    baselines: LogsLike,
+    *,
+    window: float | None = None,
+    false_alarm_time: float = FALSE_ALARM_TIME,
+    faults: Sequence[str] | None = None,
+) -> Monitoring:
+    """Watch logs window by window, each a day of the unit; alarm where a fault begins.
+
+    `elevon.diagnose.monitor.Monitor` takes samples as they come.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of them
+        In the order of time.
+    actuator : Actuator, str or path
+        The healthy unit, calibrated.
+    baselines : Log, path, or sequence of them
+        Of the healthy unit in the motion that is watched.
+    window : float, optional
+        Width [s]; default: the period of a noted sine.
+    false_alarm_time : float
+        Mean time between false alarms [s].
+    faults : sequence of str, optional
+        ``KIND@PLACE``; default: all candidates.
+
+    Raises
+    ------
+    InputError
+        As `Monitor`; no window that could be used.
+    """
+    begin = clock.perf_counter()
+    stream = [drive_log(log) for log in as_logs(logs)]
+    watch = Monitor(
+        as_actuator(actuator), [drive_log(log) for log in as_logs(baselines)], window=window,
+        false_alarm_time=false_alarm_time, faults=faults, days=len(stream),
+        longest=max(item.duration for item in stream),
+    )  # fmt: skip
+    for item in stream:
+        watch.feed_log(item)
+    if all(step.skipped for step in watch.steps):
+        raise InputError(
+            f"no window of {watch.width:g} s could be used: "
+            + (watch.steps[0].skipped if watch.steps else "the logs are shorter than one")
+        )
+    return replace(watch.result(), seconds=clock.perf_counter() - begin)

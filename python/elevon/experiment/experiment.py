@@ -1,0 +1,249 @@
+"""A log's test on a model, with values and faults that differ from run to run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.errors import InputError, Interrupted
+from elevon.experiment.inputs import Inputs, Table, checked
+from elevon.experiment.model_run import ModelRun
+from elevon.faults import Fault
+from elevon.logs.log import Log
+from elevon.parameters.records import positions
+from elevon.scenario import Scenario
+from elevon.scenario.compile import signal_records
+from elevon.simulate.acting import report
+from elevon.simulate.batch import simulate_prepared
+from elevon.simulate.prepare import Prepared, Run, prepare
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["Experiment", "Variant", "run_all", "shown_by"]
+
+_CHUNK = 64  # runs held at once
+
+Progress = Callable[[float], Any]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """How one run differs from the experiment.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        Parameters by path, SI.
+    faults : tuple of str
+        As in ``--fault``.
+    loads : mapping of str to (ndarray, ndarray)
+        Loads by port, in place of the log's.
+    initial : mapping of str to float
+        Signals that start elsewhere, SI.
+    later : float
+        s by which all inputs come later.
+    number : int
+        Of its random numbers.
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    faults: tuple[str, ...] = ()
+    loads: Mapping[str, Table] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
+    later: float = 0.0
+    number: int = 0
+
+
+class Experiment:
+    """The test of a log, ready to be run on an actuator's model.
+
+    Names, units and ranges are checked once; the variants exchange numbers only.
+
+    Parameters
+    ----------
+    log : Log
+        Whose test it is.
+    actuator : Actuator
+        The model.
+    inputs : Inputs or Scenario
+        What drove the log; a scenario where the test is known to the last bit.
+    shows : mapping of str to str
+        Role to the model's signal; default: what the model has of the log's roles.
+    rate : str
+        Of what is recorded: ``400 Hz``, or ``every`` step.
+    period : float, optional
+        Seconds between two recorded samples at most, instead of a rate.
+    fidelity : str
+        ``low`` or ``high``.
+    notices : bool
+        Whether what has no effect in the run is reported.
+
+    Raises
+    ------
+    InputError
+        Values, inputs or signals that the model cannot take.
+    """
+
+    def __init__(
+        self,
+        log: Log,
+        actuator: Actuator,
+        inputs: Inputs | Scenario,
+        shows: Mapping[str, str] | None = None,
+        *,
+        rate: str = "every",
+        period: float | None = None,
+        fidelity: str = "low",
+        notices: bool = False,
+    ) -> None:
+        self.log, self.actuator, self.fidelity = log, actuator, fidelity
+        served = shown_by(actuator.wiring, fidelity) if shows is None else shows
+        self.shows = {r: s for r, s in served.items() if shows is not None or r in log.channels}
+        record = f"{','.join(dict.fromkeys(self.shows.values()))}@{rate}"
+        known = inputs if isinstance(inputs, Scenario) else inputs.scenario()
+        run = Run(actuator, known)
+        ready = prepare(run, fidelity, record, notices=notices)
+        if notices:
+            report([ready.notices], strict=False)
+        plan = ready.plan[0]
+        if period is not None:
+            plan = replace(plan, period_steps=max(1, int(period / ready.step + 1e-6)))
+        tables = {} if isinstance(inputs, Scenario) else inputs.tables(log.name)
+        core = {**ready.core, "inputs": _filled(ready.core["inputs"], tables)}
+        self._prepared = replace(ready, core=core, plan=[plan])
+        self._place = positions(actuator.wiring)
+
+    @property
+    def step(self) -> float:
+        """Solver step [s]."""
+        return self._prepared.step
+
+    def run(
+        self,
+        variants: Sequence[Variant] = (Variant(),),
+        progress: Progress | None = None,
+        threads: int | None = None,
+    ) -> Iterator[ModelRun]:
+        """Run the variants, some of them at once; yield what each shows, in their order.
+
+        Raises
+        ------
+        InputError
+            A path, a fault or a value that cannot be.
+        Interrupted
+            `progress` returned False.
+        """
+        for first in range(0, len(variants), _CHUNK):
+            part = variants[first : first + _CHUNK]
+            yield from run_all([(self, variant) for variant in part], progress, threads)
+
+    def sensitivities(
+        self, variant: Variant, paths: Sequence[str], progress: Progress | None = None
+    ) -> dict[str, dict[str, Floats]]:
+        """Return a run's exact derivatives: path to role to values, shape (n,), on `log.time`.
+
+        They are those of the branch the run takes: where friction sticks or slips they jump.
+        """
+        from elevon import _core
+
+        ready = self._varied(variant)
+        plan = [clock.to_core() for clock in ready.plan]
+        passes = _core.sensitivities(
+            self.actuator.wiring, self.fidelity, ready.core, plan, list(paths), [],
+            lambda fraction: progress is None or progress(fraction) is not False,
+        )  # fmt: skip
+        if any(item["status"] == "interrupted" for item in passes):
+            raise Interrupted("the run was stopped")
+        count, out = _core.derivatives_per_pass(), {}
+        for number, item in enumerate(passes):
+            rows = item["clocks"][ready.plan[0].name]
+            chosen = paths[count * number : count * (number + 1)]
+            array = rows["values"].reshape(len(rows["time"]), -1, 1 + len(chosen))
+            for k, path in enumerate(chosen):
+                out[path] = {
+                    role: np.interp(self.log.time, rows["time"], array[:, at, 1 + k])
+                    for role, at in self._columns().items()
+                }
+        return out
+
+    def _columns(self) -> dict[str, int]:
+        names = self._prepared.plan[0].signals
+        return {role: names.index(signal) for role, signal in self.shows.items()}
+
+    def _varied(self, variant: Variant) -> Prepared:
+        base = self._prepared.core
+        vector = np.array(base["parameters"])
+        for path, value in variant.values.items():
+            vector[self._place[path]] = value
+        faults = [
+            Fault.parse(text).resolved(self.actuator.wiring, self.fidelity, f"fault[{k}]")
+            for k, text in enumerate(variant.faults)
+        ]
+        loads = {p: checked(t, f"{self.log.name}: {p}") for p, t in variant.loads.items()}
+        inputs = _filled(base["inputs"], loads)
+        if variant.later != 0.0:
+            inputs = {
+                port: [{**t, "times": np.asarray(t["times"]) + variant.later} for t in terms]
+                for port, terms in inputs.items()
+            }
+        core = {
+            **base,
+            "parameters": vector,
+            "inputs": inputs,
+            "faults": faults,
+            "initial": {**base["initial"], **variant.initial},
+            "run": variant.number,
+        }
+        return replace(self._prepared, core=core)
+
+    def _read(self, result: Mapping[str, Any]) -> ModelRun:
+        rows = result["clocks"][self._prepared.plan[0].name]
+        values = rows["values"]
+        channels = {role: values[:, at] for role, at in self._columns().items()}
+        units = {role: self.log.units.get(role, "") for role in channels}
+        log = Log(self.log.name, np.asarray(rows["time"]), channels, units)
+        status, message = str(result["status"]), str(result["message"])
+        return ModelRun(status, float(result["time"]), message, log)
+
+
+def run_all(
+    runs: Sequence[tuple[Experiment, Variant]],
+    progress: Progress | None = None,
+    threads: int | None = None,
+) -> list[ModelRun]:
+    """Run variants of several experiments in one batch; what each shows, in their order.
+
+    Raises
+    ------
+    InputError, Interrupted
+        As `Experiment.run`.
+    """
+    fidelities = {experiment.fidelity for experiment, _ in runs}
+    if len(fidelities) > 1:
+        raise InputError("runs of one batch have one fidelity")
+    ready = [experiment._varied(variant) for experiment, variant in runs]
+    results = simulate_prepared(
+        ready, fidelity=fidelities.pop(), progress=progress, threads=threads
+    )
+    return [experiment._read(r) for (experiment, _), r in zip(runs, results, strict=True)]
+
+
+def shown_by(wiring: str, fidelity: str) -> dict[str, str]:
+    """Return role to signal; what a sensor shows before what is true."""
+    records = signal_records(wiring, fidelity)
+    return {item["role"]: name for name, item in records.items() if item["role"] is not None}
+
+
+def _filled(
+    inputs: Mapping[str, Sequence[Mapping[str, Any]]], tables: Mapping[str, Table]
+) -> dict[str, Any]:
+    """Return the core's inputs with the arrays of some ports."""
+    filled: dict[str, Any] = dict(inputs)
+    for port, (times, values) in tables.items():
+        filled[port] = [{**inputs[port][0], "times": times, "values": values}]
+    return filled

@@ -1,0 +1,112 @@
+"""A drive's log as calibration and diagnosis read it: without gaps, no faster than they need."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.errors import InputError
+from elevon.logs.log import Bools, Log, bridged, per_log
+
+__all__ = ["RATE", "drive_log", "group_means", "groups_of", "thinned"]
+
+_LEAST_SAMPLES = 200
+_NEEDED = ("speed_ref", "motor_speed")
+_CURRENTS = ("torque_current", "current_ref")  # the measured one first
+_OPTIONAL = ("current_ref", "motor_position", "output_position")
+#: Hz, the least that is left. ASSUMED: ten times the lag of the bench's current filter, more than
+#: twice the bench's own rate; time and memory of calibration grow with the samples.
+RATE = 1000.0
+
+
+@per_log
+def drive_log(log: Log) -> Log:
+    """Return what calibration and diagnosis need of a drive's log, its gaps bridged, thinned.
+
+    `good` marks the samples at which speed, its set point and the current are all present. The
+    channel ``torque_voltage`` is the set point of the torque current's voltage; its gaps stay.
+
+    Raises
+    ------
+    InputError
+        Speed, its set point or a current is missing, or too few samples are complete.
+    """
+    name = log.name
+    for needed in _NEEDED:
+        if not log.has(needed):
+            raise InputError(
+                f"{name}: no channel has the role {needed}; calibration needs a speed set point, "
+                f"the motor's speed and a torque current; roles: {', '.join(log) or 'none'}"
+            )
+    log = log.on("speed_ref")
+    current = next((role for role in _CURRENTS if log.has(role)), None)
+    if current is None:
+        raise InputError(f"{name}: no torque current; friction cannot be determined")
+    if len(log.time) < _LEAST_SAMPLES:
+        raise InputError(f"{name}: {len(log.time)} samples; calibration needs {_LEAST_SAMPLES}")
+    needed_roles = (*_NEEDED, current)
+    good = log.good & np.isfinite(np.column_stack([log[r] for r in needed_roles])).all(axis=1)
+    if good.sum() < _LEAST_SAMPLES:
+        raise InputError(f"{name}: {int(good.sum())} samples are complete; {_LEAST_SAMPLES} needed")
+    enough = [r for r in _OPTIONAL if log.has(r) and np.isfinite(log[r]).sum() >= _LEAST_SAMPLES]
+    roles = dict.fromkeys((*needed_roles, *enough))
+    channels = {role: bridged(log.time, log[role]) for role in roles}
+    voltage = _voltage(log)
+    if voltage is not None:
+        channels["torque_voltage"] = voltage
+    ready = thinned(replace(log, channels=channels, good=good, recording=None))
+    ready.memory[drive_log.__wrapped__] = ready  # type: ignore[attr-defined]
+    return ready
+
+
+def _voltage(log: Log) -> Floats | None:
+    """The set point of the voltage, which a recording may hold beside the measured one."""
+    known = log.recording
+    if known is not None and "voltage_q_ref" not in known:
+        return None
+    if known is None or len(known["voltage_q_ref"].values) != len(log.time):
+        values = log.get("torque_voltage")
+    else:
+        values = np.array(known["voltage_q_ref"].values, dtype=np.float64)
+    usable = values is not None and np.isfinite(values).sum() > len(values) // 2
+    return values if usable else None
+
+
+def groups_of(time: Floats) -> int:
+    """Return how many samples of a log of these instants [s] make one."""
+    period = float(np.median(np.diff(time)))
+    return max(1, int(1.0 / (period * RATE) + 1e-6))
+
+
+def group_means(values: Floats, count: int) -> Floats:
+    """Means of groups of `count` samples, shape (n,) to (n // count,); NaN where one is missing."""
+    whole = len(values) // count
+    return np.asarray(values[: whole * count].reshape(whole, count).mean(axis=1))
+
+
+def thinned(log: Log) -> Log:
+    """Return a log of at least `RATE`: means of groups, all channels and the clock alike.
+
+    A mean over a group acts on every channel in the same way, so no channel is late against
+    another, and what is linear between them stays as it is.
+    """
+    count = groups_of(log.time)
+    if count == 1:
+        return log
+    time = group_means(log.time, count)
+    brake = log.brake
+    if len(brake.time):
+        brake = replace(brake, time=brake.time - time[0])
+    size = len(time)
+    good: Bools = np.asarray(log.good[: size * count].reshape(size, count).all(1))
+    return replace(
+        log,
+        start=log.start + float(time[0]),
+        time=time - time[0],
+        channels={role: group_means(values, count) for role, values in log.channels.items()},
+        brake=brake,
+        good=good,
+        recording=None,
+    )

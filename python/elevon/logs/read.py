@@ -1,0 +1,173 @@
+"""Logs read from files, with what stands beside them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+from elevon.errors import FormatError, InputError
+from elevon.logs.drive import drive_log
+from elevon.logs.importing import ImportedLog, import_log, same_rate
+from elevon.logs.log import Log
+from elevon.logs.maps.column_map import ColumnMap
+from elevon.logs.report import ImportReport
+from elevon.recording import Recording
+
+__all__ = ["LogsLike", "as_logs", "log_of", "read_drive_logs", "read_log", "read_logs"]
+
+#: A column map, its file or its name; None where the headers say what is what.
+MapLike = ColumnMap | str | Path | None
+#: One log or several, read already or by their files.
+LogsLike = Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]]
+
+
+def read_log(
+    path: str | Path,
+    map: MapLike = None,  # noqa: A002 - the option's name
+    note: str | Path | None = None,
+    loadcell: str | Path | None = None,
+    *,
+    gear_ratio: float | None = None,
+    sidecars: bool = True,
+) -> Log:
+    """Read a log, or a recording of the package's own.
+
+    Parameters
+    ----------
+    path : path
+        In any format that `elevon.logs.importing.import_log` reads.
+    map : ColumnMap or path, optional
+        What the columns are, where the headers do not say it.
+    note, loadcell : path, optional
+        Command note and load-cell file; by default those that stand beside the log.
+    gear_ratio : float, optional
+        Motor over output.
+    sidecars : bool
+        Whether files beside the log are looked for.
+
+    Returns
+    -------
+    Log
+        SI, by roles.
+
+    Raises
+    ------
+    InputError, FormatError
+        Anything in the files that cannot be read as one consistent log.
+    """
+    return log_of(_imported(path, map, note, loadcell, gear_ratio=gear_ratio, sidecars=sidecars))
+
+
+def log_of(imported: ImportedLog) -> Log:
+    """Return an imported log by its roles."""
+    report = imported.report
+    warnings = [f"{f.place}: {f.text}" for f in report.findings if f.level == "warning"]
+    name = Path(report.source).name
+    return Log.of(imported.recording, name, note=imported.note, warnings=warnings)
+
+
+def read_logs(
+    paths: Sequence[str | Path],
+    map: MapLike | Sequence[MapLike] = None,  # noqa: A002 - as `read_log`
+    *,
+    loadcells: Sequence[str | Path | None] = (),
+    notes: Sequence[str | Path | None] = (),
+    one_rate: bool = False,
+) -> list[Log]:
+    """Read several logs; of those with one name the folder stands before it.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        As `read_log`.
+    map : ColumnMap or path, or a sequence of them, optional
+        For all of them, or one for each.
+    loadcells, notes : sequence of path or None
+        One for each log, or none at all.
+    one_rate : bool
+        Refuse logs of different rates.
+
+    Raises
+    ------
+    InputError
+        Two rates, or as `read_log`.
+    """
+    cells = [*loadcells, *[None] * len(paths)]
+    texts = [*notes, *[None] * len(paths)]
+    one = map is None or isinstance(map, (ColumnMap, str, Path))
+    maps = cast("list[MapLike]", [map] * len(paths) if one else list(map))  # type: ignore[arg-type]
+    read = [_imported(p, maps[k], texts[k], cells[k]) for k, p in enumerate(paths)]
+    if one_rate:
+        same_rate(read)
+    logs = [log_of(item) for item in read]
+    names = [log.name for log in logs]
+    return [
+        replace(log, name=f"{Path(path).resolve().parent.name}/{log.name}")
+        if names.count(log.name) > 1
+        else log
+        for path, log in zip(paths, logs, strict=True)
+    ]
+
+
+def read_drive_logs(
+    paths: Sequence[str | Path],
+    map: MapLike = None,  # noqa: A002 - as `read_log`
+    *,
+    loadcells: Sequence[str | Path | None] = (),
+    notes: Sequence[str | Path | None] = (),
+    one_rate: bool = True,
+) -> list[Log]:
+    """Read logs of a drive, each as `elevon.logs.drive.drive_log` makes it; as `read_logs`."""
+    logs = read_logs(paths, map, loadcells=loadcells, notes=notes, one_rate=one_rate)
+    return [drive_log(log) for log in logs]
+
+
+def _imported(
+    path: str | Path,
+    column_map: MapLike,
+    note: str | Path | None,
+    loadcell: str | Path | None,
+    *,
+    gear_ratio: float | None = None,
+    sidecars: bool = True,
+) -> ImportedLog:
+    try:
+        return import_log(
+            path, column_map=column_map, loadcell=loadcell, command=note, gear_ratio=gear_ratio,
+            sidecars=sidecars,
+        )  # fmt: skip
+    except (FormatError, InputError):
+        if column_map is not None or note is not None or loadcell is not None:
+            raise
+        try:  # a table of ours without the file beside it
+            recording = Recording.load(path)
+        except (FormatError, InputError):
+            recording = None
+        if recording is None:
+            raise
+    return ImportedLog(recording, ImportReport(str(path), "recording"), None)
+
+
+def as_logs(
+    given: LogsLike,
+    map: MapLike = None,  # noqa: A002 - as `read_log`
+) -> list[Log]:
+    """Return logs: as given, or read from their files, each name once.
+
+    Raises
+    ------
+    InputError
+        No log, two of one name, or as `read_log`.
+    """
+    items = [given] if isinstance(given, (Log, str, os.PathLike)) else list(given)
+    paths = [item for item in items if not isinstance(item, Log)]
+    read = iter(read_logs([Path(path) for path in paths], map) if paths else ())
+    logs = [item if isinstance(item, Log) else next(read) for item in items]
+    names = [log.name for log in logs]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"two logs are named {twice}; give them different names")
+    return logs

@@ -1,0 +1,216 @@
+"""What is still possible after the tests so far: sets of faults, their weights and severities."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
+from elevon.diagnose.bymodel.posterior import PRIOR_FAULTY, SECOND
+from elevon.errors import FormatError, InputError
+from elevon.files import read_regular
+
+__all__ = ["Belief", "Possible", "read_result"]
+
+_LONGEST = 2**24  # bytes of a result; it has some ten thousand
+_LEAST = 1e-4  # weight that all sets have together that a result does not list
+_SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it
+_NINETY = 3.29  # deviations in a Gaussian's interval of 90 %
+_KNOWN = {c.key: c for c in CANDIDATES}
+
+
+@dataclass(frozen=True)
+class Possible:
+    """One set of faults.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        ``KIND@PLACE``; none for healthy.
+    weight : float
+        Probability.
+    centre, deviation : tuple of float
+        Severity of each; a deviation of infinity: anywhere in the candidate's range, small
+        more often than large.
+    """
+
+    keys: tuple[str, ...]
+    weight: float
+    centre: tuple[float, ...] = ()
+    deviation: tuple[float, ...] = ()
+
+    def severities(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draw severities, shape (count, faults), within the candidates' ranges."""
+        columns = []
+        for key, centre, deviation in zip(self.keys, self.centre, self.deviation, strict=True):
+            c = _KNOWN[key]
+            if math.isfinite(deviation):
+                drawn = centre + deviation * rng.standard_normal(count)
+            else:
+                end = np.where(rng.random(count) * (c.high - c.low) < -c.low, c.low, c.high)
+                drawn = end * rng.uniform(_SMALL, 1.0, count) ** 2
+            columns.append(np.clip(drawn, c.low, c.high))
+        return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
+
+
+@dataclass(frozen=True)
+class Belief:
+    """Sets of faults whose weights sum to one."""
+
+    possible: tuple[Possible, ...]
+
+    @classmethod
+    def of(cls, possible: Sequence[Possible]) -> Belief:
+        """Return the sets with their weights made to sum to one."""
+        total = sum(p.weight for p in possible)
+        if not total > 0.0:
+            raise InputError("next-test: nothing is possible; the results contradict each other")
+        return cls(tuple(replace(p, weight=p.weight / total) for p in possible))
+
+    @classmethod
+    def prior(cls, candidates: Sequence[CandidateFault] = CANDIDATES) -> Belief:
+        """Return what is believed before any test: the prior of diagnosis by the model."""
+        total = sum(c.rate for c in candidates)
+        out = [Possible((), 1.0 - PRIOR_FAULTY)]
+        for c in candidates:
+            share = PRIOR_FAULTY * (1.0 - SECOND) * c.rate / total
+            out.append(Possible((c.key,), share, (0.0,), (math.inf,)))
+        pairs = list(combinations(candidates, 2))
+        norm = sum(a.rate * b.rate for a, b in pairs) or 1.0
+        for a, b in pairs:
+            share = PRIOR_FAULTY * SECOND * a.rate * b.rate / norm
+            out.append(Possible((a.key, b.key), share, (0.0, 0.0), (math.inf, math.inf)))
+        return cls.of(out)
+
+    @classmethod
+    def after(cls, results: Sequence[Mapping[str, Any]]) -> Belief:
+        """Return what is believed after diagnoses (`elevon diagnose --json`) of different logs.
+
+        Each result counts by how far it moved the weights from its own prior; a fault that it did
+        not score counts as absent, as it would on a log that cannot show it.
+        """
+        prior = cls.prior().possible
+        answered = [Answered.of(result) for result in results]
+        out = []
+        for before in prior:
+            weight = before.weight * math.prod(t.ratio(before) for t in answered)
+            known = [t.possible[before.keys] for t in answered if before.keys in t.possible]
+            out.append(_merged(replace(before, weight=weight), known))
+        return cls.of([p for p in out if p.weight > 0.0])
+
+    @property
+    def entropy(self) -> float:
+        """What is not known, in bits."""
+        weights = np.array([p.weight for p in self.possible])
+        weights = weights[weights > 0.0]
+        return float(-np.sum(weights * np.log2(weights)))
+
+    def leading(self, least: float = 0.003) -> Belief:
+        """Return the sets that are worth telling apart."""
+        return Belief.of([p for p in self.possible if p.weight >= least])
+
+
+def _merged(possible: Possible, results: Sequence[Possible]) -> Possible:
+    """Join severities by their precision."""
+    known = [s for s in results if all(map(math.isfinite, s.deviation))]
+    if not known or not possible.keys:
+        return possible
+    centres = np.array([s.centre for s in known])
+    precision = np.array([s.deviation for s in known]) ** -2.0
+    centre = (precision * centres).sum(axis=0) / precision.sum(axis=0)
+    deviation = 1.0 / np.sqrt(precision.sum(axis=0))
+    return replace(possible, centre=tuple(centre.tolist()), deviation=tuple(deviation.tolist()))
+
+
+def read_result(path: str | Path) -> dict[str, object]:
+    """Read what `elevon diagnose --json` printed.
+
+    Raises
+    ------
+    FormatError
+        No such file, no JSON, or no diagnosis of a rotary actuator.
+    """
+    try:
+        data = json.loads(read_regular(path, _LONGEST))
+        Answered.of(data)
+    except (OSError, ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
+        why = f"no {error}" if isinstance(error, KeyError) else str(error)
+        raise FormatError(
+            f"{path}: not a result of elevon diagnose --json of a rotary actuator: {why}"
+        ) from error
+    return dict(data)
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What one result says.
+
+    Attributes
+    ----------
+    possible : dict
+        The sets it lists, by their keys.
+    remaining : float
+        Weight of all other sets together.
+    candidates : frozenset of str
+        Faults that it scored; what its log cannot show is not among them.
+    prior : dict
+        Weight of every set before its log.
+    """
+
+    possible: dict[tuple[str, ...], Possible]
+    remaining: float
+    candidates: frozenset[str]
+    prior: dict[tuple[str, ...], float]
+
+    @classmethod
+    def of(cls, result: Mapping[str, Any]) -> Answered:
+        """Read a result."""
+        possible = {one.keys: one for one in map(_possible, result["hypotheses"])}
+        seen = {*result["detectable"], *chain.from_iterable(possible)}
+        candidates = [c for c in CANDIDATES if c.key in seen]
+        prior = {p.keys: p.weight for p in Belief.prior(candidates).possible}
+        if result.get("method") == "surrogate":
+            prior = {keys: _trained(len(keys)) for keys in prior}
+        remaining = max(1.0 - sum(p.weight for p in possible.values()), _LEAST)
+        return cls(possible, remaining, frozenset(c.key for c in candidates), prior)
+
+    def ratio(self, before: Possible) -> float:
+        """How far it moved the weight of a set."""
+        keys = tuple(key for key in before.keys if key in self.candidates)
+        if keys in self.possible:
+            return self.possible[keys].weight / self.prior[keys]
+        return self.remaining / sum(w for k, w in self.prior.items() if k not in self.possible)
+
+
+def _trained(count: int) -> float:
+    """Share of one set of so many faults among the runs that a surrogate is trained on."""
+    from elevon.diagnose.surrogate.population import FAULTS, HEALTHY, SINGLE
+    from elevon.diagnose.surrogate.table import FAULTY_DAYS, HEALTHY_DAYS
+
+    share = (HEALTHY, SINGLE, 1.0 - HEALTHY - SINGLE)[count] / math.comb(len(FAULTS), count)
+    faulty = FAULTY_DAYS / (FAULTY_DAYS + HEALTHY_DAYS)
+    return faulty * share + (0.0 if count else 1.0 - faulty)
+
+
+def _possible(item: Mapping[str, Any]) -> Possible:
+    """Return one listed set; its keys in the order of the candidates."""
+    rows = {f"{f['kind']}@{f['place']}": f for f in item["faults"]}
+    if not rows.keys() <= _KNOWN.keys():
+        raise ValueError(f"{', '.join(sorted(rows.keys() - _KNOWN.keys()))} is no candidate")
+    keys = tuple(sorted(rows, key=list(_KNOWN).index))
+    centre = tuple(float(rows[k]["severity"]) for k in keys)
+    deviation = tuple(_deviation(rows[k]) for k in keys)
+    return Possible(keys, float(item["probability"]), centre, deviation)
+
+
+def _deviation(fault: Mapping[str, Any]) -> float:
+    low, high = fault["interval"]
+    return max(float(high) - float(low), 1e-9) / _NINETY

@@ -1,0 +1,52 @@
+"""The door `elevon.next_test`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from elevon.diagnose.bymodel.answer import Diagnosis
+from elevon.nexttest.belief import read_result
+from elevon.nexttest.choose import next_test as choose
+from elevon.simulate.arguments import as_actuator
+
+if TYPE_CHECKING:
+    from elevon.nexttest.choose import NextTest
+    from elevon.progress import Progress
+    from elevon.simulate.arguments import ActuatorLike
+
+__all__ = ["next_test"]
+
+
+def next_test(
+    actuator: ActuatorLike,
+    results: Sequence[Diagnosis | Mapping[str, object] | str | os.PathLike[str]] = (),
+    *,
+    progress: Progress | None = None,
+) -> NextTest:
+    """Rank the bench's tests by the information they are expected to give.
+
+    Parameters
+    ----------
+    actuator : Actuator, str or path
+        The healthy unit, calibrated.
+    results : sequence of Diagnosis, mapping or path
+        Diagnoses so far, of different logs, also as JSON.
+    progress : callable, optional
+        Called with the done fraction; returns False to stop.
+
+    Raises
+    ------
+    InputError
+        An actuator that it does not serve; results that contradict each other.
+    """
+    data = [
+        item.to_dict()
+        if isinstance(item, Diagnosis)
+        else item
+        if isinstance(item, Mapping)
+        else read_result(os.fspath(item))
+        for item in results
+    ]
+    return choose(as_actuator(actuator), data, progress=progress)

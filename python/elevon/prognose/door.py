@@ -1,0 +1,181 @@
+"""The doors `elevon.predict` and `elevon.fleet`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.diagnose.bymodel.answer import Diagnosis
+from elevon.errors import InputError
+from elevon.prognose.answer import Prognosis
+from elevon.prognose.fleet import Costs, FleetPlan, plan_fleet
+from elevon.prognose.history import History, diagnosed, read_history
+from elevon.prognose.mission import Mission
+from elevon.prognose.observation import Inspection, inspection
+from elevon.prognose.page import prognosis_page
+from elevon.prognose.predict import predict as look_ahead
+from elevon.prognose.respond import respond
+from elevon.progress import Progress, part
+from elevon.simulate.arguments import as_actuator
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.prognose.response import ResponseTables
+    from elevon.report import Report
+    from elevon.simulate.arguments import ActuatorLike
+
+__all__ = ["HistoryLike", "MissionLike", "fleet", "predict"]
+
+#: Inspections as the filters take them, or the use at each diagnosis and the diagnosis.
+_Seen = Sequence[tuple[float, Diagnosis]] | Sequence[Inspection | tuple[float, Diagnosis]]
+#: A folder of inspections, or one that is read, too.
+HistoryLike = str | os.PathLike[str] | History | _Seen
+MissionLike = str | os.PathLike[str] | Mission
+
+
+def predict(
+    history: HistoryLike,
+    actuator: ActuatorLike,
+    mission: MissionLike,
+    *,
+    survive: Sequence[float] = (),
+    particles: int = 2000,
+    snapshots: bool = False,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Prognosis:
+    """Predict how long a unit will do what it must.
+
+    Parameters
+    ----------
+    history : path, History, or sequence of (float, Diagnosis) or Inspection
+        Folder of dated diagnoses or logs, or what was read of one; or the unit's use at each
+        diagnosis, in the mission's unit, and the diagnosis.
+    actuator : Actuator, str or path
+        The unit, calibrated.
+    mission : Mission or path
+        What it does and must.
+    survive : sequence of float
+        N of the probability to survive the next N; default: round ones.
+    particles : int
+        Of the filter.
+    snapshots : bool
+        Whether the tables are corrected by runs at high fidelity.
+    seed : int
+        Of the filter.
+    progress : callable, optional
+        Called with the done fraction; returns False to stop.
+
+    Raises
+    ------
+    InputError
+        A history or mission that cannot be, logs that cannot be diagnosed, N below 0.
+    """
+    if any(not n >= 0.0 for n in survive):
+        raise InputError("--survive: N must be 0 or more")
+    model, flown = as_actuator(actuator), _mission(mission)
+    given = _read(history, flown)
+    tables = respond(model, flown, snapshots=snapshots, progress=part(progress, 0.0, 0.5))
+    return _one(
+        given, model, flown, tables, survive=survive, particles=particles, seed=seed,
+        progress=part(progress, 0.5, 1.0),
+    )  # fmt: skip
+
+
+def _mission(given: MissionLike) -> Mission:
+    return given if isinstance(given, Mission) else Mission.load(given)
+
+
+def _read(given: HistoryLike, mission: Mission) -> History | _Seen:
+    if isinstance(given, (str, os.PathLike)):
+        return read_history(os.fspath(given), unit=mission.unit)
+    return given
+
+
+def _one(
+    history: History | _Seen,
+    model: Actuator,
+    mission: Mission,
+    tables: ResponseTables,
+    *,
+    survive: Sequence[float] = (),
+    particles: int = 2000,
+    seed: int = 0,
+    serial: str = "",
+    progress: Progress | None = None,
+) -> Prognosis:
+    if isinstance(history, History):
+        serial = serial or history.serial
+        read = diagnosed(history, model, progress=progress)
+        seen = read.inspections(tables.laws, tables.units_by_name)
+    else:
+        seen = [_inspected(item, tables) for item in history]
+    result = look_ahead(
+        seen, model, mission, response=tables, particles=particles, seed=seed, serial=serial
+    )
+
+    def page(answer: Prognosis, date: str | None) -> Report:
+        return prognosis_page(answer, seen, tables.laws, actuator=model.name, date=date)
+
+    return replace(result, horizons=tuple(survive), page=page)
+
+
+def _inspected(item: Inspection | tuple[float, Diagnosis], tables: ResponseTables) -> Inspection:
+    if isinstance(item, Inspection):
+        return item
+    usage, answer = item
+    name = f"use {usage:g}"
+    return inspection(answer.to_dict(stored=False), tables.laws, usage=float(usage), name=name)
+
+
+def fleet(
+    histories: Sequence[HistoryLike],
+    actuator: ActuatorLike,
+    mission: MissionLike,
+    *,
+    early: float = 1.0,
+    late: float = 10_000.0,
+    visit: float = 500.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> FleetPlan:
+    """Predict several units of one type and group their maintenance.
+
+    Parameters
+    ----------
+    histories : sequence of path, History or sequence of Inspection
+        One a unit.
+    actuator, mission, seed, progress
+        As `predict`.
+    early, late, visit : float
+        Cost of one unit of use thrown away, of a failure in service, and of a visit for all units
+        at it.
+
+    Raises
+    ------
+    InputError
+        As `predict`; two histories of one unit.
+    """
+    costs = Costs(early, late, visit)
+    model, flown = as_actuator(actuator), _mission(mission)
+    read = [_read(item, flown) for item in histories]
+    pairs = zip(read, histories, strict=True)
+    names = [_name(item, given, k) for k, (item, given) in enumerate(pairs)]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"two histories are of the unit {twice}")
+    tables = respond(model, flown, progress=progress)
+    units = {
+        name: _one(item, model, flown, tables, seed=seed, serial=name)
+        for name, item in zip(names, read, strict=True)
+    }
+    return plan_fleet(units, costs)
+
+
+def _name(read: object, given: HistoryLike, number: int) -> str:
+    if isinstance(read, History) and read.serial:
+        return read.serial
+    return Path(given).name if isinstance(given, (str, os.PathLike)) else f"unit {number + 1}"

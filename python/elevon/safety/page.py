@@ -1,0 +1,127 @@
+"""The report of the safety campaign: by hazard, the worst row's timeline, messages to the crew."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.recording.states import code_names
+from elevon.report import Report, ReportTable
+from elevon.report.figures import new_figure
+from elevon.reproduce.provenance import provenance
+from elevon.safety.hazards import HAZARDS, RECORD
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.recording import Recording
+    from elevon.safety.campaign import HazardRow, SafetyResult
+
+__all__ = ["safety_report"]
+
+
+def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None = None) -> Report:
+    """Return the report of a campaign.
+
+    Parameters
+    ----------
+    result : SafetyResult
+        What it showed.
+    actuator : Actuator
+        What was run: the worst rows are simulated again for their pictures.
+    date : str, optional
+        Printed instead of the day's.
+    """
+    situations = sum(len(item.findings) for item in result.hazards)
+    report = Report(
+        f"Safety of {actuator.name}",
+        f"{result.runs} situations with up to three failures, {result.repeated} of them again at "
+        f"high fidelity. {situations} show a hazard.",
+        date=date,
+    )
+    report.fact("Situations", str(result.runs), "at low fidelity")
+    report.fact("Hazards shown", str(situations), "rows, each hazard counted")
+    single = sum(item.single for item in result.hazards if item.severe)
+    report.fact("Severe by one failure", str(single), "must be none")
+    _hazards(report, result)
+    for item in result.hazards:
+        if item.findings:
+            _worst(report, actuator, item.name, item.findings)
+    groups = [[name, number] for name, number in result.groups.items()]
+    report.section("What was run").table(ReportTable(["Group", "Rows"], groups))
+    report.section("Checks").checks(result.checks)
+    command = f"elevon safety {actuator.name} --seed {result.seed} --out DIR"
+    report.provenance(provenance(command, Seed=result.seed))
+    return report
+
+
+def _hazards(report: Report, result: SafetyResult) -> None:
+    texts = {item.name: item.text for item in HAZARDS}
+    rows: list[list[object]] = [
+        [item.name, texts[item.name], len(item.findings), item.listed, item.single, item.per_hour]
+        for item in result.hazards
+    ]
+    section = report.section("Hazards")
+    section.table(
+        ReportTable(
+            ["Hazard", "What it is", "Rows", "Listed", "By one failure", "Per hour"],
+            rows,
+            "Listed: no sensor could tell, with the reason below. Per hour: the sum over the "
+            "combinations of the products of their failures' rates, an upper bound.",
+            formats=("", "", "", "", "", ".1e"),
+        )
+    )
+
+
+def _worst(report: Report, actuator: Actuator, name: str, findings: tuple[HazardRow, ...]) -> None:
+    """A hazard's combinations, why no sensor could tell, and its worst row over time."""
+    section = report.section(name[0].upper() + name[1:])
+    combinations = {item.row.combination: item for item in findings}
+    rows: list[list[object]] = [
+        [key, item.fidelity, item.time, item.reason or "not listed"]
+        for key, item in combinations.items()
+    ]
+    section.table(
+        ReportTable(["Failures", "Fidelity", "From [s]", "Why no sensor could tell"], rows,
+                    formats=("", "", ".2f", ""))
+    )  # fmt: skip
+    unlisted = [item for item in findings if not item.reason]
+    chosen = min(unlisted or findings, key=lambda item: len(item.row.faults))
+    recording = _again(actuator, chosen)
+    section.figure(
+        _timeline(recording, chosen), f"{chosen.row.combination}. {chosen.row.situation}"
+    )
+    section.points(_messages(recording, actuator.wiring))
+
+
+def _again(actuator: Actuator, finding: HazardRow) -> Recording:
+    from elevon.simulate import simulate
+
+    return simulate(actuator, finding.row.scenario(), fidelity=finding.fidelity, record=[RECORD])
+
+
+def _timeline(recording: Recording, finding: HazardRow) -> Any:
+    time = recording["state"].time
+    with new_figure(2, sharex=True) as (figure, (upper, lower)):
+        upper.plot(time, 1e3 * recording["output_position"].values)
+        upper.set_ylabel("ram [mm]")
+        upper.axvline(finding.time, linestyle=":")
+        lower.step(time, recording["state"].values, where="post", label="state displayed")
+        lower.step(time, recording["locked"].values, where="post", label="lock engaged")
+        lower.set_xlabel("time [s]")
+        lower.legend()
+    return figure
+
+
+def _messages(recording: Recording, wiring: str) -> list[str]:
+    """What the crew sees, in order."""
+    lines: list[tuple[float, str]] = []
+    for signal in ("state", "warning_code", "fault_code"):
+        channel, names = recording[signal], code_names(wiring, signal)
+        edges = np.flatnonzero(np.diff(channel.values)) + 1
+        lines += [
+            (float(channel.time[index]), f"{names.get(int(channel.values[index]), 'none')}")
+            for index in (0, *edges)
+            if signal == "state" or channel.values[index] > 0.0
+        ]
+    return [f"{time:.2f} s: {text}" for time, text in sorted(lines)]

@@ -1,0 +1,57 @@
+"""Why no sensor could tell: the combinations of failures that remain, by hazard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from elevon.safety.rows import Row
+
+__all__ = ["reason"]
+
+_LOCK_SWITCH = "proximity_on@sensor.proximity_100"
+_ORDER = {"proximity_on@sensor.proximity_75", "proximity_on@sensor.proximity_25"}
+_HANGS = {
+    "jam", "friction_growth", "efficiency_loss", "lock_spring_weak", "lock_not_engaging",
+    "release_cable_failed",
+}  # fmt: skip
+
+
+def _names(row: Row) -> set[str]:
+    return {failure.name for failure in row.faults}
+
+
+def _fall_without_a_lock(row: Row) -> bool:
+    kinds = {failure.kind for failure in row.faults}
+    return bool(row.times("free_fall")) and _LOCK_SWITCH in _names(row) and bool(kinds & _HANGS)
+
+
+def _fall_out_of_order(row: Row) -> bool:
+    return (
+        bool(row.times("free_fall")) and _LOCK_SWITCH in _names(row) and bool(_names(row) & _ORDER)
+    )
+
+
+_REASONS: tuple[tuple[str, Callable[[Row], bool], str], ...] = (
+    ("false locked", _fall_without_a_lock,
+     "free fall: the stages are apart, the Hall count is silent; of the switches only that on the "
+     "lock sleeve sees the lock, and it reads on while the leg does not reach it"),
+    ("false locked", _fall_out_of_order,
+     "free fall: the lock's switch and the one whose time would contradict it both read on"),
+)  # fmt: skip
+
+
+def reason(hazard: str, row: Row) -> str:
+    """Return why no sensor could tell the hazard of a row; empty: it is not listed.
+
+    Parameters
+    ----------
+    hazard : str
+        Its name.
+    row : Row
+        Failures and commands; a single failure is never listed.
+    """
+    if len(row.faults) < 2:
+        return ""
+    return next((text for name, holds, text in _REASONS if name == hazard and holds(row)), "")

@@ -1,0 +1,1 @@
+"""Detection limit of each fault in each standard test of each actuator."""

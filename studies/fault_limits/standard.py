@@ -1,0 +1,186 @@
+"""The standard tests of an actuator: its stand's procedures that diagnosis reads, run and read.
+
+The stand chooses how a log is made and diagnosed; no actuator is known by name.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.bench.procedure import Procedure, RigStep, TraceStep, load_procedure, procedure_names
+from elevon.bench.stand import stand_of
+from elevon.errors import ElevonWarning
+from elevon.logs.log import Log
+from elevon.progress import part
+from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.progress import Progress
+
+__all__ = ["Day", "StandardTest", "day_logs", "diagnosed", "standard_tests"]
+
+_LONGEST = 60.0  # s: longer traces are of temperatures
+_BLOCK = 12  # logs held at the recorder's inner rate at once
+_POSITION = "rotary"  # equipment whose logs are read by the model of the rotary bench
+
+
+@dataclass(frozen=True)
+class StandardTest:
+    """One trace of a procedure, with the steps that set the bench for it.
+
+    Attributes
+    ----------
+    name : str
+        Of the trace.
+    procedure : Procedure
+        Its steps.
+    """
+
+    name: str
+    procedure: Procedure
+
+
+@dataclass(frozen=True)
+class Day:
+    """A day on the bench: what is broken, and what chance sets.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        As in ``--fault``.
+    seed : int
+        Of the day's temperatures, friction and supply, of the command's start, of noise.
+    """
+
+    faults: tuple[str, ...]
+    seed: int
+
+
+def standard_tests(actuator: Actuator) -> tuple[StandardTest, ...]:
+    """Return the tests, in the order of the bench's list.
+
+    What commands nothing, or is there for temperatures or vibration (a rate of its own), is none.
+    """
+    stand = stand_of(actuator.wiring)
+    out = []
+    for name in procedure_names(stand.name):
+        procedure = load_procedure(name)
+        traces = [step for step in procedure.step if isinstance(step, TraceStep)]
+        moved = any(isinstance(step, RigStep) and step.terms for step in procedure.step)
+        if stand.equipment == _POSITION:
+            traces = traces[:1]
+        for trace in traces:
+            if not moved and _read(trace):
+                out.append(StandardTest(trace.name, _up_to(procedure, trace)))
+    return tuple(out)
+
+
+def _read(trace: TraceStep) -> bool:
+    command = trace.command
+    moving = any(term.kind != "constant" for term in command.terms) or command.steps
+    return (
+        bool(moving)
+        and command.mode in ("position", "gear")
+        and trace.rate is None
+        and parse_quantity(trace.duration, "s", "duration") <= _LONGEST
+    )
+
+
+def _up_to(procedure: Procedure, trace: TraceStep) -> Procedure:
+    """Return the procedure with this trace alone, and what was set before it."""
+    from elevon.bench.procedure import BacklashStep
+
+    at = next(k for k, step in enumerate(procedure.step) if step is trace)
+    before = [s for s in procedure.step[:at] if not isinstance(s, TraceStep | BacklashStep)]
+    return procedure.model_copy(update={"step": (*before, trace)})
+
+
+def day_logs(
+    actuator: Actuator,
+    test: StandardTest,
+    days: Sequence[Day],
+    fidelity: str = "low",
+    progress: Progress | None = None,
+) -> list[Log]:
+    """Run a test on several days, in a batch; return the logs as diagnosis reads them."""
+    out: list[Log] = []
+    for first in range(0, len(days), _BLOCK):
+        block = days[first : first + _BLOCK]
+        share = part(progress, first / len(days), (first + len(block)) / len(days))
+        rotary = stand_of(actuator.wiring).equipment == _POSITION
+        made = _rotary if rotary else _loaded
+        with (
+            warnings.catch_warnings()
+        ):  # a day may set what an actuator's own model of heat replaces
+            warnings.simplefilter("ignore", ElevonWarning)
+            out += made(actuator, test, block, fidelity, share)
+    return out
+
+
+def _of_day(actuator: Actuator, day: Day) -> Actuator:
+    from elevon.diagnose.bymodel.candidates import of_a_magnet
+    from elevon.diagnose.byroles.spread import drawn
+
+    return drawn(of_a_magnet(actuator), np.random.default_rng([day.seed, 16]))
+
+
+def _rotary(
+    actuator: Actuator,
+    test: StandardTest,
+    days: Sequence[Day],
+    fidelity: str,
+    progress: Progress | None,
+) -> list[Log]:
+    from elevon.bench.rig import setups
+    from elevon.bench.traces import recorded
+    from elevon.bench.virtual import traced
+    from elevon.scenario.compile import signal_records
+    from elevon.simulate import Run, simulate_batch
+
+    ready = [
+        setups(test.procedure, _of_day(actuator, day), faults=day.faults, seed=day.seed)[0]
+        for day in days
+    ]
+    record = recorded(list(signal_records(actuator.wiring, fidelity)))
+    runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in ready]
+    recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
+    return [traced(s, recording) for s, recording in zip(ready, recordings, strict=True)]
+
+
+def _loaded(
+    actuator: Actuator,
+    test: StandardTest,
+    days: Sequence[Day],
+    fidelity: str,
+    progress: Progress | None,
+) -> list[Log]:
+    from elevon.bench.loaded import loaded_setups, run_loaded_batch
+
+    stand = stand_of(actuator.wiring)
+    ready = [
+        loaded_setups(
+            test.procedure, _of_day(actuator, day), stand, faults=day.faults, seed=day.seed
+        )[0]
+        for day in days
+    ]
+    return [Log.of(log, "log") for log, _ in run_loaded_batch(ready, fidelity, progress)]
+
+
+def diagnosed(
+    actuator: Actuator, log: Log, baselines: Sequence[Log], faults: Sequence[str] | None = None
+) -> Diagnosis:
+    """Return the diagnosis of one log as `elevon diagnose` makes it."""
+    from elevon.diagnose.bymodel import diagnose
+    from elevon.diagnose.byroles import diagnose_by_roles
+
+    if stand_of(actuator.wiring).equipment == _POSITION:
+        return diagnose([log], actuator, baselines=baselines, faults=faults)
+    named = [replace(item, name=f"baseline {k + 1}") for k, item in enumerate(baselines)]
+    return diagnose_by_roles([log], actuator, baselines=named, faults=faults)
