@@ -97,6 +97,10 @@ class DamageError(FormatError):
     """A file that is not as it was written: its checksum or its description says so."""
 
 
+class VersionError(FormatError):
+    """A file of our own whose layout this version does not read."""
+
+
 class OutputError(InputError, OSError):
     """An output that cannot be written."""
 

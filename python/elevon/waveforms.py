@@ -16,6 +16,7 @@ from elevon.errors import InputError, unknown
 __all__ = [
     "TABLE",
     "WaveRecord",
+    "check_repeated",
     "check_values",
     "complete",
     "evaluate",
@@ -186,6 +187,32 @@ def _check_cycle(record: WaveRecord, values: Mapping[str, float], place: str) ->
                 f"{place}: a repeated trapezoid needs a cycle longer than zero and than the "
                 f"rounding of its time: {cycle:g} s, at least {least:g} s"
             )
+
+
+def check_repeated(times: npt.NDArray[np.float64], start: float, place: str) -> None:
+    """Check that a table that repeats has a cycle whose phase has digits.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Instants of the table's points [s]. One point is a constant, and repeats as one.
+    start : float
+        Instant at which the table's time is zero [s].
+    place : str
+        For the message.
+
+    Raises
+    ------
+    InputError
+        A cycle below the rounding of its time.
+    """
+    cycle = float(times[-1] - times[0])
+    least = max(_SHORTEST, _SHORTEST_PART * abs(start + float(times[0])))
+    if len(times) > 1 and cycle < least:
+        raise InputError(
+            f"{place}: a repeated table needs a cycle longer than the rounding of its time: "
+            f"{cycle:g} s, at least {least:g} s"
+        )
 
 
 def _check_acceleration(record: WaveRecord, values: Mapping[str, float], place: str) -> None:

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from elevon import Recording
-from elevon.errors import DamageError, InputError
+from elevon.errors import DamageError, InputError, VersionError
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log, bridged, per_log
 from elevon.logs.read import read_log, read_logs
@@ -118,4 +118,13 @@ def test_a_recording_with_a_damaged_description_is_no_log_of_somebody_else(tmp_p
     table = pq.read_table(path)
     pq.write_table(table.replace_schema_metadata({"elevon": text}), path)
     with pytest.raises(DamageError, match="description is damaged"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("ending", [".parquet", ".nc", ".mat", ".csv"])
+def test_a_recording_of_a_later_layout_is_no_log_of_somebody_else(tmp_path, monkeypatch, ending):
+    recording().save(tmp_path / f"a{ending}")
+    path = next(tmp_path.glob(f"*{ending}"))
+    monkeypatch.setattr("elevon.recording.header._READ", (1,))
+    with pytest.raises(VersionError, match="layout has version"):
         read_log(path)

@@ -266,3 +266,12 @@ def test_corners_that_cannot_be_rounded_are_refused(
     """Too little room, a negative limit, a sharp end, a jump."""
     with pytest.raises(InputError, match=words):
         command_of([term(kind, **{**ROUNDED[kind][0], **more})])
+
+
+def test_a_table_that_repeats_within_the_rounding_of_its_time_is_refused() -> None:
+    """The cycle of 0.8 s has no phase at 1e12 s; once, or alone, a table may start there."""
+    late = {"times": TIMES, "values": VALUES, "start": "1e12 s"}
+    with pytest.raises(InputError, match=r"0\.8 s, at least 1 s"):
+        command_of([term("table", **late, repeat=True)])
+    command_of([term("table", **late, repeat=False)])
+    command_of([term("table", times=[0.0], values=[0.1], start="1e12 s", repeat=True)])

@@ -60,7 +60,7 @@ def test_markdown_shows_the_text(text, displayed):
     assert displayed is None or given == displayed
 
 
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
+@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r", "\n=", "  @"])
 def test_a_cell_is_no_formula(start):
     assert csv_cell(f"{start}cmd|' /C calc'!A0") == f"'{start}cmd|' /C calc'!A0"
 

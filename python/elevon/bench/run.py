@@ -15,7 +15,7 @@ from elevon.bench.rig import Setup, setups
 from elevon.bench.stand import stand_of
 from elevon.bench.state import BenchState
 from elevon.bench.traces import recorded, write_traces
-from elevon.errors import InputError
+from elevon.errors import InputError, Interrupted
 from elevon.files import check_output, write_text
 from elevon.logs.formats.drive import DriveFormat
 from elevon.plain import WORKING, Plain, in_unit
@@ -216,6 +216,8 @@ def run_procedure(
         state = _claim(procedure, folder, logs_asked, fidelity, layout, force=force)
         for number, setup in enumerate(logs_asked):
             share = part(progress, number / len(logs_asked), (number + 1) / len(logs_asked))
+            if share is not None and share(0.0) is False:
+                raise Interrupted(f"stopped before the log {setup.trace.name}")
             log, seconds = _one(setup, state, layout, fidelity, share, force=force)
             logs.append(log)
             simulated += seconds

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from elevon.errors import DamageError, FormatError, InputError, RangeError
+from elevon.errors import DamageError, FormatError, InputError, RangeError, VersionError
 from elevon.logs.channels import examine_channels
 from elevon.logs.clocks.loadcell_join import join_loadcell
 from elevon.logs.clocks.quality import ClockQuality, clock_quality
@@ -212,8 +212,8 @@ def _begins_saved(file: Path) -> bool:
         if file.suffix.lower() in {".parquet", ".nc", ".mat"}:
             Recording.load(file)
             return True
-    except DamageError:
-        raise  # ours, and not as it was written: no table of somebody else's
+    except (DamageError, VersionError):
+        raise  # ours, and not readable here: no table of somebody else's
     except (InputError, OSError):
         return False
     return False

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import DamageError, FormatError, InputError
+from elevon.errors import DamageError, FormatError, InputError, VersionError
 
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
@@ -119,7 +119,7 @@ class Header:
         ------
         DamageError
             Not the JSON of a recording: no log of somebody else's either.
-        FormatError
+        VersionError
             Of a later schema.
         """
         if len(text) > _LONGEST:
@@ -127,7 +127,7 @@ class Header:
         try:
             document = _decoded(json.loads(text))
             if document["schema"] not in _READ:
-                raise FormatError(
+                raise VersionError(
                     f"{place}: its layout has version {document['schema']!r}, "
                     f"this Elevon reads version {' and '.join(str(number) for number in _READ)}"
                 )

@@ -13,13 +13,18 @@ FORMULA = "=+-@\t\r"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(inf|nan)")
 
 
+def _begins_formula(text: str) -> bool:
+    """Whether it does, blanks before it or not: some readers strip them."""
+    return text[:1] in ("\t", "\r") or text.lstrip().startswith(tuple(FORMULA))
+
+
 def csv_cell(value: object) -> object:
     """Return a cell as it goes into a CSV file.
 
     The rule of every CSV file: a text that a spreadsheet would read as a formula gets an apostrophe
     before it. Numbers, and texts that are numbers, stay as they are.
     """
-    if isinstance(value, str) and value[:1] in FORMULA and value and not _NUMBER.fullmatch(value):
+    if isinstance(value, str) and _begins_formula(value) and not _NUMBER.fullmatch(value):
         return f"'{value}"
     return value
 

@@ -12,7 +12,7 @@ from elevon.faults import check_together
 from elevon.parameters.records import wirings
 from elevon.scenario.scenario import Action, Scenario, Term, Terms
 from elevon.units import check_kind, parse_quantity, to_si
-from elevon.waveforms import TABLE, check_values, unit_of, wave_records
+from elevon.waveforms import TABLE, check_repeated, check_values, unit_of, wave_records
 
 __all__ = [
     "CompiledScenario",
@@ -193,11 +193,14 @@ def compile_term(term: Term, port_unit: str, place: str) -> dict[str, Any]:
             unit = unit_of(parameter, port_unit) or "1"
             values[parameter.name] = _value(given, parameter.name, unit, place)
     check_values(record, values, place)
+    points = _table(term, port_unit, place)
+    if term.kind == TABLE and values["repeat"]:
+        check_repeated(points["times"], values["start"], place)
     return {
         "kind": term.kind,
         "enabled": term.enabled,
         "parameters": list(values.values()),
-        **_table(term, port_unit, place),
+        **points,
     }
 
 
