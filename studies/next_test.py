@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.nexttest import Belief, Possible, profiles
 from elevon.nexttest.information import expected_information, likelihoods, planned
 from elevon.report import Check, verdict
@@ -174,7 +174,7 @@ def study_next_test(
         Told the done fraction; returns False to stop.
     """
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.candidates import of_a_magnet
+    from elevon.diagnose.engine.candidates import of_a_magnet
 
     actuator = of_a_magnet(Actuator.load("torino-rotary")).with_values({"drive.kind": "pwm"})
     bench = _Bench(actuator, pairs)
@@ -224,8 +224,8 @@ class _Bench:
         from elevon.bench.rig import setups
         from elevon.bench.traces import recorded
         from elevon.bench.virtual import traced
-        from elevon.diagnose.bymodel.log import prepared
-        from elevon.diagnose.bymodel.replay import logged_features
+        from elevon.diagnose.engine.replay import logged_features
+        from elevon.diagnose.positions.log import prepared
         from elevon.diagnose.surrogate.population import day_of
         from elevon.scenario.compile import signal_records
         from elevon.simulate import Run, simulate_batch

@@ -29,7 +29,7 @@ _KINDS = {
     "bench": "elevon.bench.run:BenchResult",
     "calibration": "elevon.calibrate.outcome:Calibration",
     "comparison": "elevon.compare:Comparison",
-    "diagnosis": "elevon.diagnose.bymodel.answer:Diagnosis",
+    "diagnosis": "elevon.diagnose.engine.answer:Diagnosis",
     "effects": "elevon.analysis.effects:Effects",
     "fleet": "elevon.prognose.fleet:FleetPlan",
     "linear-model": "elevon.response.linear:LinearModel",

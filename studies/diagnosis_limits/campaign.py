@@ -111,7 +111,7 @@ def calibrated_on(
     """Calibrate on the first of some healthy trials; all of them are baselines."""
     from elevon.actuator import Actuator
     from elevon.calibrate.calibration import calibrate
-    from elevon.diagnose.bymodel.log import prepared
+    from elevon.diagnose.positions.log import prepared
 
     with tempfile.TemporaryDirectory() as folder:
         logs = bench_logs(unit, trials, Path(folder), part(progress, 0.0, 0.3))
@@ -126,7 +126,7 @@ def _block_rows(
     baselines: Sequence[Log],
     progress: Progress | None,
 ) -> Iterator[Row]:
-    from elevon.diagnose.bymodel import diagnose
+    from elevon.diagnose.engine import diagnose
 
     with tempfile.TemporaryDirectory() as folder:
         trials = [p.trial for p in block]

@@ -84,7 +84,7 @@ class BenchUnit:
 def draw_unit(seed: int, number: int) -> BenchUnit:
     """Draw a unit; odd ones have bristle friction (LuGre), even ones a Stribeck curve."""
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.candidates import of_a_magnet
+    from elevon.diagnose.engine.candidates import of_a_magnet
 
     rng = np.random.default_rng([seed, 101, number])
     base = of_a_magnet(Actuator.load(BASE))

@@ -25,7 +25,7 @@ from studies.fault_limits.standard import Day, StandardTest, day_logs, diagnosed
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
     from elevon.logs.log import Log
     from elevon.progress import Progress
 
@@ -280,7 +280,7 @@ def _spread(items: Sequence[int], count: int) -> list[int]:
 def _over(actuator: Actuator, row: Limit) -> float:
     """Twice the limit, within the catalogue's range; what is there or not is there."""
     from elevon import _core
-    from elevon.diagnose.byroles.candidates import switched_of
+    from elevon.diagnose.roles.candidates import switched_of
 
     record = next(
         r

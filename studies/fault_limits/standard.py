@@ -21,7 +21,7 @@ from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
     from elevon.progress import Progress
 
 __all__ = ["Day", "StandardTest", "day_logs", "diagnosed", "standard_tests"]
@@ -125,8 +125,8 @@ def day_logs(
 
 
 def _of_day(actuator: Actuator, day: Day) -> Actuator:
-    from elevon.diagnose.bymodel.candidates import of_a_magnet
-    from elevon.diagnose.byroles.spread import drawn
+    from elevon.diagnose.engine.candidates import of_a_magnet
+    from elevon.diagnose.roles.spread import drawn
 
     return drawn(of_a_magnet(actuator), np.random.default_rng([day.seed, 16]))
 
@@ -177,8 +177,8 @@ def diagnosed(
     actuator: Actuator, log: Log, baselines: Sequence[Log], faults: Sequence[str] | None = None
 ) -> Diagnosis:
     """Return the diagnosis of one log as `elevon diagnose` makes it."""
-    from elevon.diagnose.bymodel import diagnose
-    from elevon.diagnose.byroles import diagnose_by_roles
+    from elevon.diagnose.engine import diagnose
+    from elevon.diagnose.roles import diagnose_by_roles
 
     if stand_of(actuator.wiring).equipment == _POSITION:
         return diagnose([log], actuator, baselines=baselines, faults=faults)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.experiment import Experiment, ModelRun, Variant
 
 if TYPE_CHECKING:

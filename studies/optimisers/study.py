@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.replay import _RECENT
+from elevon.diagnose.engine.replay import _RECENT
 from elevon.report import Check, verdict
 from elevon.worklog import finished
 from studies.common import Row, student_interval
@@ -30,7 +30,7 @@ from studies.side_by_side import side_by_side
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.bench.rig import Setup
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
     from elevon.logs.log import Log
     from elevon.progress import Progress
 
@@ -270,7 +270,7 @@ def _one(
 
 
 def _ours(unit: Actuator, log: Log, base: Log) -> dict[str, Callable[[], Diagnosis]]:
-    from elevon.diagnose.bymodel import diagnose
+    from elevon.diagnose.engine import diagnose
     from elevon.diagnose.surrogate import diagnose_by_both, diagnose_by_surrogate
 
     ways = dict(zip(OURS, (diagnose, diagnose_by_both, diagnose_by_surrogate), strict=True))
@@ -280,9 +280,9 @@ def _ours(unit: Actuator, log: Log, base: Log) -> dict[str, Callable[[], Diagnos
 
 def _model_runs(unit: Actuator, log: Log) -> int:
     """Runs of the reduced-order model that diagnosis by the model makes for one log."""
-    from elevon.diagnose.bymodel.candidates import chosen
-    from elevon.diagnose.bymodel.log import prepared
-    from elevon.diagnose.bymodel.replay import replay
+    from elevon.diagnose.engine.candidates import chosen
+    from elevon.diagnose.engine.replay import replay
+    from elevon.diagnose.positions.log import prepared
 
     recordings = replay(prepared(log, unit), unit, chosen(list(CAUSES)))
     return (

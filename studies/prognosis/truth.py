@@ -10,7 +10,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.demo.life.unit import other_law
-from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.prognose.law import Law
 from elevon.prognose.life import Life, run_to_failure
 from elevon.prognose.measured import Measured

@@ -12,8 +12,8 @@ import pytest
 
 from elevon import _core
 from elevon.bench.stand import stand_of
-from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.byroles.candidates import candidates_of, counted_of, switched_of
+from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.diagnose.roles.candidates import candidates_of, counted_of, switched_of
 from elevon.units import parse_quantity
 from studies.fault_limits.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
 from tests.contract import shipped

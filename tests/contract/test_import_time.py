@@ -50,7 +50,7 @@ def test_doors_stay_doors_after_every_import():
     """A package of the same name takes no door away: calibrate, diagnose, bench, compare."""
     code = (
         "import elevon, elevon.cli, elevon.calibrate.ways, elevon.bench.run, elevon.compare, "
-        "elevon.diagnose.bymodel, elevon.response; "
+        "elevon.diagnose.engine, elevon.response; "
         "doors = 'bench calibrate compare diagnose effects fleet monitor next_test predict "
         "read_log response validate'; "
         "print({type(getattr(elevon, name)).__name__ for name in doors.split()})"

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from elevon.diagnose.bymodel import diagnose
-from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.case import LogCase
-from elevon.diagnose.bymodel.detection import Detector
-from elevon.diagnose.bymodel.diagnosis import answer_of
-from elevon.diagnose.bymodel.features import FeatureVector
-from elevon.diagnose.bymodel.healthy import healthy
-from elevon.diagnose.bymodel.not_modelled import not_modelled
-from elevon.diagnose.bymodel.replay import Replay
-from elevon.diagnose.bymodel.words import sentence
+from elevon.diagnose.engine import diagnose
+from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.diagnose.engine.case import LogCase
+from elevon.diagnose.engine.detection import Detector
+from elevon.diagnose.engine.diagnosis import answer_of
+from elevon.diagnose.engine.healthy import healthy
+from elevon.diagnose.engine.not_modelled import not_modelled
+from elevon.diagnose.engine.replay import Replay
+from elevon.diagnose.engine.words import sentence
+from elevon.diagnose.positions.features import FeatureVector
 from elevon.errors import InputError
 from elevon.faults import catalogue
 from studies.diagnosis_limits.campaign import calibrated

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elevon.calibrate.backlash import through_backlash
-from elevon.diagnose.bymodel.features import features_of
+from elevon.diagnose.positions.features import features_of
 from elevon.logs.log import Log
 
 RATIO, BACKLASH = 124.0, 0.009

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.errors import FormatError, InputError
 from elevon.nexttest import Belief, Possible, next_test, profiles

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from elevon.actuator import Actuator
-from elevon.diagnose.bymodel.log import prepared
+from elevon.diagnose.positions.log import prepared
 from elevon.logs.read import read_log
 from elevon.scenario import Scenario
 from elevon.simulate import simulate

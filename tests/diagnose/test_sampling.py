@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.case import case_of
-from elevon.diagnose.bymodel.likelihood import Frame, one_fault, prior_density, two_faults
-from elevon.diagnose.bymodel.log import prepared
-from elevon.diagnose.bymodel.posterior import quantiles
+from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.diagnose.engine.case import case_of
+from elevon.diagnose.engine.likelihood import Frame, one_fault, prior_density, two_faults
+from elevon.diagnose.engine.posterior import quantiles
+from elevon.diagnose.positions.log import prepared
 from tests.diagnose.virtual import bench_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.diagnose.bymodel.candidates import CANDIDATES
-from elevon.diagnose.bymodel.features import UNITS, features_of, median
-from elevon.diagnose.bymodel.lost_motion import carried
+from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.diagnose.positions.features import UNITS, features_of, median
+from elevon.diagnose.positions.lost_motion import carried
 from elevon.diagnose.surrogate import (
     Surrogate,
     diagnose_by_both,

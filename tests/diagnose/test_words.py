@@ -2,8 +2,8 @@
 
 import pytest
 
-from elevon.diagnose.bymodel.answer import Cause, Diagnosis
-from elevon.diagnose.bymodel.words import sentence, severity_text
+from elevon.diagnose.engine.answer import Cause, Diagnosis
+from elevon.diagnose.engine.words import sentence, severity_text
 
 
 @pytest.mark.parametrize(

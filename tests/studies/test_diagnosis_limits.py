@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from elevon.diagnose.bymodel.answer import Cause, Diagnosis
+from elevon.diagnose.engine.answer import Cause, Diagnosis
 from elevon.errors import InputError, Interrupted
 from studies import main
 from studies.diagnosis_limits.campaign import Campaign, run_campaign

@@ -3,7 +3,7 @@
 import pytest
 
 from elevon import Actuator
-from elevon.diagnose.bymodel.answer import Cause, Diagnosis
+from elevon.diagnose.engine.answer import Cause, Diagnosis
 from elevon.errors import InputError, Interrupted, UnknownNameError
 from studies.fault_limits import limits as fault_limits
 from studies.fault_limits.limits import (

@@ -29,7 +29,7 @@ from elevon.errors import InputError
 from elevon.number_text import severity_texts
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -88,7 +88,7 @@ def diagnose(
 
 
 def _print(result: Diagnosis) -> None:
-    from elevon.diagnose.bymodel.words import by_reason
+    from elevon.diagnose.engine.words import by_reason
 
     answer(result.headline)
     rows = [

@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from elevon.calibrate.ways import turns
-from elevon.diagnose.bymodel.answer import Diagnosis
+from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor, Monitoring
 from elevon.errors import InputError, unknown
 from elevon.logs.drive import drive_log
@@ -90,7 +90,7 @@ def _method(
     if method not in METHODS:
         raise unknown("method", method, METHODS, "--method")
     if method == "model":
-        from elevon.diagnose.bymodel import diagnose as by_model
+        from elevon.diagnose.engine import diagnose as by_model
 
         if given is not None:
             raise InputError("--surrogate: serves --method surrogate and both")
@@ -115,7 +115,7 @@ def _by_model(
     baselines: Sequence[Log],
     **options: Any,
 ) -> Diagnosis:
-    from elevon.diagnose.bymodel.traces import traces_of
+    from elevon.diagnose.engine.traces import traces_of
 
     data = [drive_log(log) for log in logs]
     result = run(data, model, baselines=[drive_log(log) for log in baselines], **options)
@@ -125,8 +125,8 @@ def _by_model(
 def _by_roles(
     logs: Sequence[Log], model: Actuator, baselines: Sequence[Log], **options: Any
 ) -> Diagnosis:
-    from elevon.diagnose.byroles import diagnose_by_roles
-    from elevon.diagnose.byroles.traces import traces_by_roles
+    from elevon.diagnose.roles import diagnose_by_roles
+    from elevon.diagnose.roles.traces import traces_by_roles
 
     result = diagnose_by_roles(logs, model, baselines=baselines, **options)
     return replace(result, actuator=model.name, draw=partial(traces_by_roles, logs, model, result))

@@ -13,7 +13,7 @@ from elevon.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from elevon.diagnose.bymodel.answer import Diagnosis, Moved
+    from elevon.diagnose.engine.answer import Diagnosis, Moved
 
 __all__ = ["SignalPanel", "Traces", "features_figure", "named_faults", "traces_figure"]
 

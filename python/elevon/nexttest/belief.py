@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
-from elevon.diagnose.bymodel.posterior import PRIOR_FAULTY, SECOND
+from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
+from elevon.diagnose.engine.posterior import PRIOR_FAULTY, SECOND
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from elevon.diagnose.bymodel.candidates import CANDIDATES
+from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.errors import InputError, Interrupted
 from elevon.nexttest.belief import Belief
 from elevon.nexttest.information import expected_information, planned

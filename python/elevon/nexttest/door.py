@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.bymodel.answer import Diagnosis
+from elevon.diagnose.engine.answer import Diagnosis
 from elevon.nexttest.belief import read_result
 from elevon.nexttest.choose import next_test as choose
 from elevon.simulate.arguments import as_actuator

@@ -9,12 +9,12 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.bench.virtual import traced
-from elevon.diagnose.bymodel.candidates import CANDIDATES, CandidateFault
-from elevon.diagnose.bymodel.case import LogCase
-from elevon.diagnose.bymodel.healthy import healthy
-from elevon.diagnose.bymodel.likelihood import Frame
-from elevon.diagnose.bymodel.log import prepared
-from elevon.diagnose.bymodel.replay import logged_features, replay
+from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
+from elevon.diagnose.engine.case import LogCase
+from elevon.diagnose.engine.healthy import healthy
+from elevon.diagnose.engine.likelihood import Frame
+from elevon.diagnose.engine.replay import logged_features, replay
+from elevon.diagnose.positions.log import prepared
 from elevon.nexttest.belief import Belief, Possible
 
 if TYPE_CHECKING:

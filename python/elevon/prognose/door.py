@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.bymodel.answer import Diagnosis
+from elevon.diagnose.engine.answer import Diagnosis
 from elevon.errors import InputError
 from elevon.prognose.answer import Prognosis
 from elevon.prognose.fleet import Costs, FleetPlan, plan_fleet

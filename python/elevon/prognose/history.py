@@ -29,7 +29,7 @@ from elevon.prognose.predict import check_order
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel import Diagnosis
+    from elevon.diagnose.engine import Diagnosis
     from elevon.logs.log import Log
     from elevon.prognose.law import Law
 
@@ -132,7 +132,7 @@ class History:
 
 def _check_reset(entry: HistoryEntry, laws: Sequence[Law]) -> None:
     """Refuse a part made new that neither the laws nor diagnosis know: it is a slip of the pen."""
-    from elevon.diagnose.bymodel.candidates import CANDIDATES
+    from elevon.diagnose.engine.candidates import CANDIDATES
 
     known = {law.key for law in (*LAWS.values(), *laws)}
     known |= {f"{c.kind}@{place}" for c in CANDIDATES for place in (c.place, *c.same)}
@@ -243,7 +243,7 @@ def _logs(path: Path, data: Mapping[str, Any]) -> tuple[MappedLog, ...]:
 
 def known_keys() -> frozenset[str]:
     """Return the keys that an inspection may have: its stamp's, and those of a diagnosis."""
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
 
     return _KEYS | _ABOUT | keys_of(Diagnosis)
 

@@ -233,7 +233,7 @@ def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
 
 def _edge(kind: str) -> float:
     """Return the greatest severity that diagnosis looks at."""
-    from elevon.diagnose.bymodel.candidates import CANDIDATES
+    from elevon.diagnose.engine.candidates import CANDIDATES
 
     return max((c.high for c in CANDIDATES if c.kind == kind), default=np.inf)
 

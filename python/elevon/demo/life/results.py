@@ -15,7 +15,7 @@ from elevon.prognose.metrics import Track, cumulative_relative_accuracy
 from elevon.report.checks import Check, verdict
 
 if TYPE_CHECKING:
-    from elevon.diagnose.bymodel import Diagnosis
+    from elevon.diagnose.engine import Diagnosis
     from elevon.prognose import Inspection, Prognosis, ResponseTables
 
 __all__ = ["InspectionVisit", "LifeDemo", "Statement"]
@@ -39,7 +39,7 @@ class Statement:
     @classmethod
     def of(cls, answer: Diagnosis) -> Statement:
         """Take it from the whole answer."""
-        from elevon.diagnose.bymodel.words import sentence
+        from elevon.diagnose.engine.words import sentence
 
         return cls(answer.to_dict(), sentence(answer))
 

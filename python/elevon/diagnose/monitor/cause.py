@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.answer import SEEN, Cause, FaultPlace
-from elevon.diagnose.bymodel.candidates import CandidateFault
-from elevon.diagnose.bymodel.likelihood import prior_density
-from elevon.diagnose.bymodel.posterior import quantiles
+from elevon.diagnose.engine.answer import SEEN, Cause, FaultPlace
+from elevon.diagnose.engine.candidates import CandidateFault
+from elevon.diagnose.engine.likelihood import prior_density
+from elevon.diagnose.engine.posterior import quantiles
 from elevon.diagnose.monitor.filter import Change
 from elevon.diagnose.monitor.reference import WindowReference
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.answer import Cause
-from elevon.diagnose.bymodel.candidates import chosen
+from elevon.diagnose.engine.answer import Cause
+from elevon.diagnose.engine.candidates import chosen
 from elevon.diagnose.monitor.cause import likely_causes
 from elevon.diagnose.monitor.filter import ChangeFilter
 from elevon.diagnose.monitor.reference import WindowReference, reference

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.candidates import CandidateFault
-from elevon.diagnose.bymodel.case import LogCase
-from elevon.diagnose.bymodel.features import FeatureVector
-from elevon.diagnose.bymodel.healthy import DEGREES, healthy
-from elevon.diagnose.bymodel.log import RUN_IN, prepared
-from elevon.diagnose.bymodel.replay import replay
+from elevon.diagnose.engine.candidates import CandidateFault
+from elevon.diagnose.engine.case import LogCase
+from elevon.diagnose.engine.healthy import DEGREES, healthy
+from elevon.diagnose.engine.replay import replay
 from elevon.diagnose.monitor.filter import WindowSpread
 from elevon.diagnose.monitor.windows import cut, run_in, stretch, top_speed, window_features
+from elevon.diagnose.positions.features import FeatureVector
+from elevon.diagnose.positions.log import RUN_IN, prepared
 from elevon.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.command import noted_command
-from elevon.diagnose.bymodel.features import FeatureVector
-from elevon.diagnose.bymodel.log import RUN_IN
-from elevon.diagnose.bymodel.replay import logged_features
+from elevon.diagnose.engine.replay import logged_features
+from elevon.diagnose.positions.command import noted_command
+from elevon.diagnose.positions.features import FeatureVector
+from elevon.diagnose.positions.log import RUN_IN
 from elevon.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from dataclasses import replace
 from itertools import chain, combinations
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.bymodel.answer import Cause, Diagnosis, Explanation, FaultPlace, SuspectedFault
-from elevon.diagnose.bymodel.candidates import CandidateFault, chosen
-from elevon.diagnose.bymodel.diagnosis import check_request
-from elevon.diagnose.bymodel.explain import POSSIBLE
+from elevon.diagnose.engine.answer import Cause, Diagnosis, Explanation, FaultPlace, SuspectedFault
+from elevon.diagnose.engine.candidates import CandidateFault, chosen
+from elevon.diagnose.engine.diagnosis import check_request
+from elevon.diagnose.engine.explain import POSSIBLE
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.diagnose.surrogate.population import FAULTS, learned
 from elevon.diagnose.surrogate.proposal import Proposal, proposed
@@ -177,7 +177,7 @@ def diagnose_by_both(
     Where the surrogate cannot speak, or says that the logs lie outside its training set, the
     model scores all causes.
     """
-    from elevon.diagnose.bymodel import diagnose
+    from elevon.diagnose.engine import diagnose
 
     begin = clock.perf_counter()
     check_request(logs, actuator, false_alarm, "the surrogate")

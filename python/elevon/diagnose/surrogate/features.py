@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.features import features_of, median
-from elevon.diagnose.bymodel.log import RUN_IN
+from elevon.diagnose.positions.features import features_of, median
+from elevon.diagnose.positions.log import RUN_IN
 from elevon.errors import InputError
 from elevon.logs.drive import drive_log
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["NAMES", "SCALES", "VOLTAGE", "SurrogateFeatures", "changes", "log_features"]
 
 
-#: Keys of `elevon.diagnose.bymodel.features.UNITS`, in the surrogate's order.
+#: Keys of `elevon.diagnose.positions.features.UNITS`, in the surrogate's order.
 NAMES = (
     "lost_motion",
     "position_scale",

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.answer import Moved
-from elevon.diagnose.bymodel.features import UNITS
+from elevon.diagnose.engine.answer import Moved
+from elevon.diagnose.positions.features import UNITS
 from elevon.diagnose.surrogate.features import NAMES, SCALES, SurrogateFeatures, log_features
 from elevon.diagnose.surrogate.model import Head, LogOpinion, Surrogate, TestModel, shipped
 from elevon.diagnose.surrogate.population import FAULTS

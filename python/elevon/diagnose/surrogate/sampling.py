@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.bymodel.healthy import FLOOR
+from elevon.diagnose.engine.healthy import FLOOR
 from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.network import Batch
 from elevon.diagnose.surrogate.population import learned

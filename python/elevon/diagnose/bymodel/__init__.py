@@ -1,6 +1,0 @@
-"""Diagnosis by the model: what moved in a log, which fault moves it so, how far, how surely."""
-
-from elevon.diagnose.bymodel.answer import Cause, Diagnosis
-from elevon.diagnose.bymodel.diagnosis import diagnose
-
-__all__ = ["Cause", "Diagnosis", "diagnose"]

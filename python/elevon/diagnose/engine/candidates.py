@@ -1,0 +1,156 @@
+"""Faults that are candidates of a diagnosis, how often they come, and how far they go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from elevon.diagnose.engine.not_modelled import not_modelled
+from elevon.errors import InputError, unknown
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["CANDIDATES", "CandidateFault", "chosen", "of_a_magnet"]
+
+_LAW = "motor.eccentricity_law"
+
+
+@dataclass(frozen=True)
+class CandidateFault:
+    """A fault of the catalogue.
+
+    Attributes
+    ----------
+    kind, place : str
+        Of the catalogue.
+    unit : str
+        Of the severity.
+    low, high : float
+        Severities considered.
+    rate : float
+        Failures per hour: the prior weight.
+    error : float
+        Deviation of the model's shift of the features, as a share of it.
+    same : tuple of str
+        Places of the same kind that no log without the electrical zero tells from this one.
+    fixed_features : tuple of str
+        Features that the fault leaves alone, although the reduced-order model moves them.
+    known_features : tuple of str
+        Features whose shift is known; what moves beside them depends on an angle that no log
+        shows, so it only makes those features uncertain. Empty: all of them.
+    ambiguous : tuple of (str, str)
+        Faults that are no candidates themselves: in closed form they move the same features.
+    switched : bool
+        Whether it is there or not: it acts in full from one half on.
+    """
+
+    kind: str
+    place: str
+    unit: str
+    low: float
+    high: float
+    rate: float
+    error: float
+    same: tuple[str, ...] = ()
+    fixed_features: tuple[str, ...] = ()
+    known_features: tuple[str, ...] = ()
+    ambiguous: tuple[tuple[str, str], ...] = ()
+    switched: bool = False
+
+    @property
+    def key(self) -> str:
+        """``KIND@PLACE``."""
+        return f"{self.kind}@{self.place}"
+
+    def text(self, severity: float) -> str:
+        """Return the fault in the grammar of faults."""
+        return f"{self.key}={severity!r}"
+
+
+# Reference: T3 Table 1.1, per hour: bearings 1.78e-5 (friction), position sensor 1.70e-5, motor
+# 1.03e-5, power connector 6.64e-7. An item's rate is shared evenly by its kinds (ASSUMED). The
+# table has no gear, no drive, no current sensor and no unbalance: backlash like the bearings,
+# unbalance and worn teeth a tenth of them, drift of a gain like the position sensor, and a current
+# sensor like that, too, shared by gain, offset and failure (ASSUMED).
+_BEARING, _SENSOR, _MOTOR, _CONNECTOR = 1.78e-5, 1.70e-5, 1.03e-5, 6.64e-7
+_PHASES = tuple(f"motor.phase_{p}" for p in "abc")
+_RINGS = tuple(f"bearing.{p}" for p in ("outer", "inner", "ball"))
+_CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
+_VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage_sideband")
+
+# How well the reduced-order model knows what a fault does, ASSUMED from benches with another
+# friction law, elastic backlash and a PWM drive: positions and gains are geometry and arithmetic,
+# ripples depend on what the current loop makes of them, friction on its law.
+#
+# A current sensor's gain leaves the motor as it is, so its EMF stays balanced; the reduced-order
+# model puts the wrong current into the motor's constants and moves the voltage as a short would.
+#
+# A weak pole pair multiplies the coefficient of phase j by a window of
+# theta_m - phi - 2 pi (j-1)/3, whose first harmonic is a dynamic eccentricity: the same sideband.
+#
+# An encoder's gain is seen as the ratio of the two positions, and so is, with the other sign, a
+# resolver's. Whether it reaches the position loop depends on where the drive closes it, which no
+# healthy log tells.
+CANDIDATES: tuple[CandidateFault, ...] = (
+    CandidateFault("backlash", "transmission", "rad", 0.0, 0.03, _BEARING, 0.01),
+    CandidateFault("friction", "transmission", "1", 0.0, 2.0, _BEARING / 3, 0.08),
+    CandidateFault("lubrication", "transmission", "1", -0.7, 5.0, _BEARING / 3, 0.10),
+    CandidateFault("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 4, 0.10, _PHASES[1:]),
+    CandidateFault("eccentricity_static", "motor", "1", 0.0, 0.6, _MOTOR / 4, 0.05),
+    CandidateFault("eccentricity_dynamic", "motor", "1", 0.0, 0.6, _MOTOR / 4, 0.10,
+                   known_features=("current_sideband", "voltage_sideband"),
+                   ambiguous=(("local_demagnetisation", "motor"),)),
+    CandidateFault("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 4, 0.05),
+    CandidateFault("unbalance", "motor.rotor", "kg m2", 0.0, 4e-4, _BEARING / 10, 0.05),
+    CandidateFault("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003),
+    CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05),
+    CandidateFault("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01,
+                   known_features=("position_scale",),
+                   ambiguous=(("gain", "sensor.resolver"),)),
+    CandidateFault("gain", _CURRENTS[0], "1", -0.3, 0.3, _SENSOR / 3, 0.10, _CURRENTS[1:],
+                   _VOLTAGES),
+    CandidateFault("tooth_wear", "gear", "rad", 0.0, 0.006, _BEARING / 10, 0.50),
+    CandidateFault("sag", "supply", "1", 0.0, 0.4, _CONNECTOR, 0.10),
+    CandidateFault("bearing", _RINGS[0], "m", 0.0, 0.005, _BEARING / 3, 0.30, _RINGS[1:]),
+)  # fmt: skip
+
+
+def chosen(texts: Sequence[str] | None) -> tuple[CandidateFault, ...]:
+    """Return the candidates, or those named as ``KIND@PLACE`` (or any place of `same`).
+
+    Raises
+    ------
+    UnknownNameError
+        None of that name is a candidate.
+    InputError
+        One is named twice, or is not modelled, with the reason.
+    """
+    if not texts:
+        return CANDIDATES
+    out: list[CandidateFault] = []
+    names = [f"{c.kind}@{p}" for c in CANDIDATES for p in (c.place, *c.same)]
+    reasons = {f"{item['kind']}@{item['place']}": item["reason"] for item in not_modelled()}
+    for text in texts:
+        key = text.strip()
+        if key in reasons:
+            raise InputError(f"--fault {key}: not modelled: {reasons[key]}")
+        if key not in names:
+            raise unknown("fault", key, names, "--fault")
+        item = next(c for c in CANDIDATES if key in {f"{c.kind}@{p}" for p in (c.place, *c.same)})
+        if item in out:
+            raise InputError(f"--fault {key}: {item.key} is already among the candidates")
+        out.append(item)
+    return tuple(out)
+
+
+def of_a_magnet(actuator: Actuator) -> Actuator:
+    """Return the actuator as diagnosis runs it: an eccentric rotor has a periodic flux.
+
+    The published law has an EMF with a mean over a turn, which no magnet has. An actuator that
+    states its law keeps it.
+    """
+    if actuator.parameters[_LAW].confidence != "default":
+        return actuator
+    return actuator.with_values({_LAW: "periodic"}, source="law of diagnosis", request=False)

@@ -1,0 +1,224 @@
+"""What an answer says beside its most probable set: causes, ambiguous ones, limits, what moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.diagnose.engine.answer import (
+    SEEN,
+    Alternative,
+    Cause,
+    Explanation,
+    FaultPlace,
+    Moved,
+    SuspectedFault,
+)
+from elevon.diagnose.engine.candidates import CandidateFault
+from elevon.diagnose.engine.case import LogCase, joined, shift_of, uncertainty_of
+from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
+from elevon.diagnose.positions.features import UNITS
+
+__all__ = [
+    "NO_CANDIDATE",
+    "alternatives",
+    "causes",
+    "explanations",
+    "limits",
+    "moved",
+    "unexplained",
+]
+
+LISTED = 0.02  # probability below which a cause is not listed
+POSSIBLE = 1e-3  # probability below which a set of faults is not listed
+UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding
+ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
+
+
+#: The finding of a faulty unit with a fault that is not among the candidates.
+NO_CANDIDATE = "no candidate explains these logs, nor is this the healthy unit"
+
+
+def unexplained(
+    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
+) -> tuple[str, ...]:
+    """Return the finding that the named faults do not explain the logs, where they do not.
+
+    What the model does not know of their shifts counts as explained.
+    """
+    from scipy.stats import f as fisher
+
+    left, wide = _left(cases, faults)
+    degrees = min(case.unit.degrees for case in cases)
+    square = float(left @ np.linalg.solve(wide, left)) / len(left)
+    if float(fisher.sf(square, len(left), degrees)) > UNLIKELY:
+        return ()
+    return (
+        "what is named does not explain all of the logs: another fault, or an actuator file not "
+        f"calibrated to this unit (rest {np.sqrt(square):.1f} deviations RMS)",
+    )
+
+
+def _sum(cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]) -> Floats:
+    total = np.zeros(sum(len(case.unit.names) for case in cases))
+    for key, value in zip(keys, values, strict=True):
+        total = total + shift_of(cases, key, np.array([value]))[0]
+    return total
+
+
+def causes(
+    result: Posterior,
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
+    root: Floats,
+    best: Sequence[str],
+) -> tuple[Cause, ...]:
+    """Return one cause for each fault of the best set, and for others of some probability."""
+    ranked = sorted(candidates, key=lambda c: (c.key not in best, -result.of(c.key)))
+    out: list[Cause] = []
+    covered: set[str] = set()
+    for c in ranked:
+        probability = result.of(c.key)
+        if c.key in covered or (probability < LISTED and c.key not in best):
+            continue
+        low, middle, high = quantiles(*marginals(result, c.key), (0.05, 0.5, 0.95))
+        ambiguous = [o for o in _ambiguous(cases, c, middle, candidates, root) if o.key not in best]
+        covered |= {o.key for o in ambiguous}
+        probability = min(probability + sum(result.of(o.key) for o in ambiguous), 1.0)
+        names = [(c.kind, place) for place in c.same] + list(c.ambiguous)
+        names += [
+            n for o in ambiguous for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.ambiguous)
+        ]
+        places = tuple(FaultPlace(*name) for name in names)
+        out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), places))
+    return tuple(sorted(out, key=lambda cause: -cause.probability))
+
+
+def _left(
+    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
+) -> tuple[Floats, Floats]:
+    """Return what faults leave of the features, and its covariance with their model errors."""
+    errors = np.concatenate([case.errors for case in cases])
+    left, wide = joined(cases)
+    for c, severity in faults:
+        shift = shift_of(cases, c.key, np.array([severity]))[0]
+        left = left - shift
+        variance = (errors * shift) ** 2 + uncertainty_of(cases, c.key, severity) ** 2
+        wide = wide + np.diag(variance) + c.error**2 * np.outer(shift, shift)
+    return left, wide
+
+
+def alternatives(
+    result: Posterior,
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
+    best: Sequence[str],
+) -> tuple[Alternative, ...]:
+    """Return the healthy unit and the single faults that are not the answer, likely ones first."""
+    known = {c.key: c for c in candidates}
+    places = [(case.name, name) for case in cases for name in case.unit.names]
+    out = []
+    for h, p in zip(result.hypotheses, result.probabilities, strict=True):
+        if len(h.keys) > 1 or h.keys == tuple(best):
+            continue
+        faults = [(known[key], value) for key, value in zip(h.keys, h.best, strict=True)]
+        left, wide = _left(cases, faults)
+        score = left / np.sqrt(np.diag(wide))
+        worst = int(np.argmax(np.abs(score)))
+        key, severity = (h.keys[0], h.best[0]) if h.keys else ("", None)
+        unit = known[key].unit if key else ""
+        out.append(Alternative(key, p, severity, unit, *places[worst], float(score[worst])))
+    return tuple(out)
+
+
+def explanations(
+    result: Posterior, candidates: Sequence[CandidateFault]
+) -> tuple[Explanation, ...]:
+    """Return the sets of faults that are still possible."""
+    known = {c.key: c for c in candidates}
+    out = []
+    for h, p in zip(result.hypotheses, result.probabilities, strict=True):
+        if p < POSSIBLE:
+            continue
+        ends = [quantiles(g, w, (0.05, 0.5, 0.95)) for g, w in zip(h.grids, h.weights, strict=True)]
+        faults = (
+            SuspectedFault(known[k].kind, known[k].place, middle, known[k].unit, (low, high))
+            for k, (low, middle, high) in zip(h.keys, ends, strict=True)
+        )
+        out.append(Explanation(tuple(faults), p))
+    return tuple(out)
+
+
+def _ambiguous(
+    cases: Sequence[LogCase],
+    candidate: CandidateFault,
+    severity: float,
+    candidates: Sequence[CandidateFault],
+    root: Floats,
+) -> list[CandidateFault]:
+    """Candidates that shift the features as this one does at this severity, to `ALIKE`.
+
+    What the model does not know of the shift, feature by feature, separates no two.
+    """
+    shift = shift_of(cases, candidate.key, np.array([severity]))[0]
+    if np.linalg.norm(root @ shift) < SEEN:
+        return []
+    extra = root * (np.concatenate([case.errors for case in cases]) * shift)
+    lower = np.linalg.cholesky(np.eye(len(root)) + extra @ extra.T)
+    whiter: Floats = np.asarray(np.linalg.solve(lower, root), dtype=np.float64)
+    target = whiter @ shift
+    out = []
+    for other in candidates:
+        if other.key == candidate.key:
+            continue
+        grid = np.linspace(other.low, other.high, 401)
+        moved = shift_of(cases, other.key, grid) @ whiter.T
+        if float(np.linalg.norm(moved - target, axis=1).min()) < ALIKE:
+            out.append(other)
+    return out
+
+
+def limits(
+    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], root: Floats
+) -> tuple[tuple[dict[str, str], ...], dict[str, float]]:
+    """Return what the logs cannot show, and the least severity of what they can."""
+    blind, limits = [], {}
+    for c in candidates:
+        grid = np.linspace(0.0, c.high, 2001)
+        size = np.linalg.norm(shift_of(cases, c.key, grid) @ root.T, axis=1)
+        seen = np.flatnonzero(size > SEEN)
+        if seen.size:
+            limits[c.key] = float(grid[seen[0]])
+            continue
+        reason = (
+            f"up to {c.high:g} {c.unit if c.unit != '1' else ''}".rstrip()
+            + f" it moves nothing here by {SEEN:g} deviations of a healthy unit"
+        )
+        names = ((c.kind, c.place), *c.ambiguous)
+        blind += [{"kind": kind, "place": place, "reason": reason} for kind, place in names]
+    return tuple(blind), limits
+
+
+def moved(
+    cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]
+) -> tuple[Moved, ...]:
+    """Return the features with what the named faults make of it."""
+    out = []
+    for case in cases:
+        std = np.sqrt(np.diag(case.covariance))
+        explained = _sum([case], keys, values)
+        for k, name in enumerate(case.unit.names):
+            out.append(
+                Moved(
+                    case.name,
+                    name,
+                    UNITS[name][0] if name in UNITS else "",
+                    float(case.features.values[k]),
+                    float(case.unit.mean[k]),
+                    float(std[k]),
+                    float(explained[k]),
+                )
+            )
+    return tuple(out)

@@ -1,0 +1,153 @@
+"""The page of a diagnosis: one sentence, then what it stands on."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from elevon.diagnose.engine.words import by_reason, sentence, severity_text
+from elevon.diagnose.pictures import features_figure, traces_figure
+from elevon.report import Report, ReportTable
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.diagnose.pictures import Traces
+
+__all__ = ["diagnosis_page"]
+
+_DRAWN = 4  # logs
+
+
+def diagnosis_page(
+    result: Diagnosis, actuator: str, date: str | None = None, *, traces: Sequence[Traces] = ()
+) -> Report:
+    """Return the report of a diagnosis.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        The answer.
+    actuator : str
+        Name of the actuator.
+    date : str, optional
+        Printed on the page.
+    traces : sequence of Traces, optional
+        Of the logs; the first four are drawn.
+    """
+    report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
+    _causes(report, result)
+    _signals(report, traces[:_DRAWN])
+    _features(report, result)
+    if result.alternatives:
+        _alternatives(report, result)
+    limits = report.section("What these logs can tell")
+    seen = [
+        (key, severity_text(value, result.severity_units[key]))
+        for key, value in result.detectable.items()
+    ]
+    blind = by_reason(result.unobservable)
+    limits.table(
+        ReportTable(
+            ("fault", "least severity seen"),
+            seen + blind,
+            "Least severity from which on 95 % of held-out single faults were named."
+            if _by_network(result)
+            else "Least severity that moves the features by three deviations of a healthy unit.",
+        )
+    )
+    for text in result.findings:
+        limits.text(text)
+    return report
+
+
+def _causes(report: Report, result: Diagnosis) -> None:
+    rows = [
+        (
+            f"{c.kind}@{c.place}",
+            c.probability,
+            severity_text(c.severity, c.unit),
+            f"{severity_text(c.interval[0], c.unit)} to {severity_text(c.interval[1], c.unit)}",
+            ", ".join(f"{kind}@{place}" for kind, place in c.ambiguous_with),
+        )
+        for c in result.faults
+    ]
+    causes = report.section("Causes")
+    causes.table(
+        ReportTable(
+            ("cause", "probability", "severity", "90 % interval", "ambiguous with"),
+            rows,
+            f"Logs: {', '.join(result.logs)}. A cause that is not listed has less than 2 %.",
+            digits=3,
+        )
+    )
+
+
+def _by_network(result: Diagnosis) -> bool:
+    """Whether nothing is known of what a cause accounts for: the surrogate has no model."""
+    return all(math.isnan(m.explained) for m in result.features)
+
+
+def _alternatives(report: Report, result: Diagnosis) -> None:
+    rows = [
+        (
+            a.fault or "healthy",
+            a.probability,
+            "" if a.severity is None else severity_text(a.severity, a.unit),
+            f"{a.name}, {a.log}" if len(result.logs) > 1 else a.name,
+            a.left,
+        )
+        for a in result.alternatives
+    ]
+    report.section("Alternatives, and what speaks against each").table(
+        ReportTable(
+            ("alternative", "probability", "fits best at", "explains worst", "left"),
+            rows,
+            "Alone, at the severity that fits best. Left: what it leaves of the feature that it "
+            "explains worst, in deviations of a healthy unit with the model's own error. Beyond "
+            "three it speaks against the alternative; within, only the prior and the sum do.",
+            digits=2,
+            formats=("", "", "", "", "+.1f"),
+        )
+    )
+
+
+def _signals(report: Report, traces: Sequence[Traces]) -> None:
+    if not traces:
+        return
+    section = report.section("Signals against the healthy model")
+    for item in traces:
+        named = " and the model with what is named" if item.panels[0].named is not None else ""
+        text = f"{item.name} over the healthy model in the same test{named}"
+        section.figure(traces_figure(item), f"{text}; means of short stretches.")
+
+
+def _features(report: Report, result: Diagnosis) -> None:
+    ranked = sorted(result.features, key=lambda item: -abs(item.score))
+    rows: list[tuple[object, ...]] = [
+        (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
+        for m in ranked
+    ]
+    names: tuple[str, ...] = (
+        "log",
+        "feature",
+        "unit",
+        "value",
+        "healthy",
+        "deviates by",
+        "explained",
+    )
+    formats: tuple[str, ...] = ("", "", "", "", "", "+.2f", "+.2f")
+    text = "Deviates by: in deviations of a healthy unit from run to run."
+    if _by_network(result):
+        rows, names, formats = [row[:-1] for row in rows], names[:-1], formats[:-1]
+    else:
+        text += " Explained: what the most probable cause accounts for, in the same measure."
+    section = report.section("Features")
+    section.figure(
+        features_figure(result.features),
+        "How far the features of the logs deviate from a healthy unit: bars, in its deviations "
+        "from run to run; diamonds, what the most probable cause accounts for.",
+    )
+    section.table(ReportTable(names, rows, text, digits=4, formats=formats))

@@ -1,0 +1,1 @@
+"""Logs with both positions of a servo: read, checked, their features by regression."""

@@ -1,0 +1,148 @@
+"""A log by its roles, from the instant at which something was first commanded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.diagnose.roles.role_test import (
+    BEFORE,
+    INPUTS,
+    RoleTest,
+    action_numbers,
+    test_of,
+)
+from elevon.errors import InputError
+from elevon.logs.log import Log, bridged, on_clock
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+__all__ = ["role_log"]
+
+_LEAST = 200  # samples
+_MISSING = 0.2  # share of samples above which a channel is left out
+_FASTEST = 1000.0  # Hz; faster logs are averaged down: the reduced-order model shows no more
+_LONGEST = 60.0  # s after the onset that are read
+_LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
+_QUIET = 1e-3  # of the command's range: below it nothing is commanded
+
+
+def role_log(log: Log, actuator: Actuator) -> RoleTest:
+    """Read a log by its roles, on one even clock counted from its onset.
+
+    Raises
+    ------
+    InputError
+        No command, nothing commanded, nothing recorded, too short, or nothing moves.
+    """
+    log, lost = _complete(log)
+    time, name = log.time, log.name
+    actions = action_numbers(actuator.wiring)
+    first = _onset(time, log["command"], sequence=bool(actions), name=name)
+    rate = 1.0 / float(np.median(np.diff(time)))
+    seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
+    clock = np.arange(-round(BEFORE * rate), round(seconds * rate) + 1) / rate
+    at = np.clip(clock + first, time[0], time[-1])
+    channels = {r: on_clock(time, v, at, log.units[r]) for r, v in log.channels.items()}
+    _check_motion(channels, name)
+    findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
+    if time[-1] - first > _LONGEST * (1.0 + _LADDER):
+        findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
+    ready = replace(
+        log, time=clock, channels=channels, good=np.ones(len(clock), dtype=np.bool_),
+        recording=None,
+    )  # fmt: skip
+    return test_of(log, ready, actuator, rate=rate, seconds=seconds, findings=findings)
+
+
+def _complete(log: Log) -> tuple[Log, list[str]]:
+    """The log on its command's clock, gaps bridged; roles with too many gaps are named."""
+    if not log.has("command"):
+        raise InputError(
+            f"{log.name}: no channel has the role 'command': the test cannot be run on the model; "
+            f"roles: {', '.join(log) or 'none'}"
+        )
+    log = log.on("command")
+    if len(log.time) < _LEAST:
+        raise InputError(f"{log.name}: {len(log.time)} samples; {_LEAST} are needed")
+    lost = [r for r, v in log.channels.items() if np.isfinite(v).mean() < 1.0 - _MISSING]
+    if "command" in lost:
+        raise InputError(f"{log.name}: too many samples of the command are missing")
+    channels = {
+        r: bridged(log.time, v, log.units[r]) for r, v in log.channels.items() if r not in lost
+    }
+    time, channels = _slower(log.time, channels, log.units)
+    return replace(log, time=time, channels=channels, good=np.ones(len(time), dtype=bool)), lost
+
+
+def _slower(
+    time: Floats, channels: Mapping[str, Floats], units: Mapping[str, str]
+) -> tuple[Floats, dict[str, Floats]]:
+    """A fast log, averaged down; states and the command are read as they stand."""
+    step = max(1, int(1.0 / (float(np.median(np.diff(time))) * _FASTEST) + 1e-6))
+    count = len(time) // step * step
+    if step == 1:
+        return time, dict(channels)
+    out = {
+        role: v[:count:step]
+        if role == "command" or units[role] == "1"
+        else v[:count].reshape(-1, step).mean(axis=1)
+        for role, v in channels.items()
+    }
+    return time[:count:step], out
+
+
+def _onset(time: Floats, command: Floats, *, sequence: bool, name: str) -> float:
+    """Instant at which something is first commanded; of a motion that goes on, its middle.
+
+    Everything is counted from there, so logs may begin at any instant before it.
+    """
+    reach = float(np.ptp(command))
+    if reach == 0.0:
+        raise InputError(f"{name}: nothing is commanded: the command never changes")
+    off = np.abs(command - command[0])
+    away = int(np.flatnonzero(off > _QUIET * reach)[0])
+    if sequence:
+        return float(time[away])
+    if away > 2:
+        return _begin(time, off, away)
+    level = command - 0.5 * (command.max() + command.min())
+    rising = np.flatnonzero((level[1:] >= 0.0) & (level[:-1] < 0.0)) + 1
+    if len(rising) and rising[0] < len(command) // 4:
+        return _crossing(time, level, int(rising[0]))
+    return float(time[0])
+
+
+def _begin(time: Floats, off: Floats, first: int) -> float:
+    """Instant from which a command goes away, by the line through its first two samples.
+
+    Samples before them are too near to count, yet may be away already; a step has none.
+    """
+    here, step = float(off[first]), float(off[min(first + 1, len(off) - 1)] - off[first])
+    back = here / step if step > 0.0 else 0.0
+    before = int(np.count_nonzero(off[:first]))
+    return float(time[first] - min(back, before + 1.0) * (time[first] - time[first - 1]))
+
+
+def _crossing(time: Floats, level: Floats, after: int) -> float:
+    """Instant between two samples at which a level passes zero."""
+    low, high = float(level[after - 1]), float(level[after])
+    part = -low / (high - low) if high > low else 1.0
+    return float(time[after - 1] + part * (time[after] - time[after - 1]))
+
+
+def _length(total: float, after: float) -> float:
+    """Seconds after the onset that are read, in steps, so that logs of one test are read alike."""
+    step = _LADDER * min(total, _LONGEST / (1.0 - _LADDER))
+    return min(float(np.floor(after / step + 1e-6)) * step, _LONGEST) or after
+
+
+def _check_motion(used: Mapping[str, Floats], name: str) -> None:
+    seen = [values for role, values in used.items() if role not in INPUTS]
+    if not any(np.ptp(values) > 0.0 for values in seen):
+        raise InputError(f"{name}: nothing moves")

@@ -1,0 +1,312 @@
+"""Diagnosis of any actuator by the roles of its logs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from elevon import Actuator, Recording, Scenario, simulate
+from elevon.cli import main
+from elevon.diagnose.roles import diagnose_by_roles
+from elevon.diagnose.roles.candidates import candidates_of, not_modelled_of
+from elevon.diagnose.roles.load import load_alike, read_load
+from elevon.diagnose.roles.log import _onset, role_log
+from elevon.diagnose.roles.numbers import numbers_of
+from elevon.diagnose.roles.role_test import same_test
+from elevon.diagnose.roles.runs import spread_of
+from elevon.diagnose.roles.spread import drawn, factors_of
+from elevon.errors import InputError, UnknownNameError
+from elevon.logs.log import Log
+from studies.fault_limits.standard import Day, day_logs, diagnosed, standard_tests
+
+pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+
+
+@pytest.fixture(scope="module")
+def screw():
+    return Actuator.load("nasa-ballscrew")
+
+
+@pytest.fixture(scope="module")
+def gear():
+    return Actuator.load("pisa-landing-gear")
+
+
+def log(actuator, *faults, day=None, start=0.3, name="log"):
+    """A low-fidelity log: a sine, or an extension, that begins at `start`."""
+    unit = actuator if day is None else drawn(actuator, np.random.default_rng(day))
+    sine = {"kind": "sine", "amplitude": "20 mm", "frequency": "0.4 Hz", "start": start}
+    command = {"mode": "position", "terms": [sine]}
+    names, seconds = "encoder_position,resolver_position,resolver_speed,current_q_meas", 5
+    if actuator.wiring == "landing_gear":
+        command = {"mode": "gear", "steps": [{"time": start, "action": "extend"}]}
+        names, seconds = "state,output_position,speed_meas,current_mean,proximity_25", 4
+    scenario = Scenario.from_dict({"duration": seconds, "command": command, "fault": list(faults)})
+    record = f"command,{names}@200 Hz"
+    return Log.of(simulate(unit, scenario, fidelity="low", record=record), name)
+
+
+def test_backlash_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
+    few = ["backlash@transmission", "gain_drift@control.position"]
+    base = [log(screw, day=1, name="base")]
+    healthy = diagnose_by_roles(
+        [log(screw, day=2, start=0.41, name="h")], screw, baselines=base, faults=few
+    )
+    assert healthy.status == "healthy"
+    fault = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
+    worn = diagnose_by_roles(
+        [log(screw, fault, day=3, name="w")], screw, baselines=base, faults=few
+    )
+    assert worn.status == "faulty"
+    assert worn.best == ("backlash@transmission",)
+    assert worn.faults[0].interval[0] < 4e-4 < worn.faults[0].interval[1]
+    assert worn.unobservable == ()  # both are seen, others were not requested
+
+
+def test_two_faults_of_a_screw_are_named_together(screw):
+    few = ["backlash@transmission", "gain_drift@control.position", "short@motor.phase_a"]
+    base = [log(screw, day=1, name="base")]
+    backlash = {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}
+    gain = {"kind": "gain_drift", "place": "control.position", "severity": -0.5}
+    answer = diagnose_by_roles(
+        [log(screw, backlash, gain, day=3, name="w")], screw, baselines=base, faults=few
+    )
+    assert set(answer.best) == {"backlash@transmission", "gain_drift@control.position"}
+    low, high = next(c.interval for c in answer.faults if c.kind == "backlash")
+    assert low < 4e-4 < high
+    assert all(c.probability > 0.9 for c in answer.faults)
+
+
+PAIRS = [
+    ("nasa-ballscrew", "sine-opposing", [
+        ("short@motor.phase_a=0.25", "gain_drift@control.position=-0.4"),
+        ("backlash@transmission=0.0004", "gain@sensor.current_a=0.2"),
+        ("demagnetisation@motor=0.2", "lubrication_loss@screw=0.9"),
+        ("gain@sensor.encoder=0.01", "eccentricity_static@motor=0.2"),
+    ]),
+    ("pisa-landing-gear", "retraction-nominal", [
+        ("demagnetisation@motor=0.3", "offset@sensor.hall_a=0.15"),
+        ("efficiency_loss@screw=0.3", "bearing_wear@motor.bearing=0.3"),
+        ("sag@supply=0.2", "short@motor.phase_a=0.3"),
+        ("demagnetisation@motor=0.25", "proximity_on@sensor.proximity_0=1"),
+    ]),
+]  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "title", "pairs"), PAIRS, ids=[name for name, *_ in PAIRS])
+def test_pairs_of_faults_are_named_with_the_whole_catalogue(name, title, pairs):
+    actuator = Actuator.load(name)
+    test = next(t for t in standard_tests(actuator) if t.name == title)
+    days = [Day((), 71), *(Day(pair, 72 + k) for k, pair in enumerate(pairs))]
+    base, *logs = day_logs(actuator, test, days)
+    for pair, item in zip(pairs, logs, strict=True):
+        answer = diagnosed(actuator, item, [base])
+        names = [{(c.kind, c.place), *c.ambiguous_with} for c in answer.faults]
+        for text in pair:
+            wanted = tuple(text.split("=")[0].split("@"))
+            assert any(wanted in causes for causes in names), (pair, answer.best)
+
+
+def test_a_gear_is_diagnosed_whenever_its_action_came(gear):
+    few = ["sag@supply", "proximity_off@sensor.proximity_25", "release_cable_failed@release"]
+    base = [log(gear, day=1, name="base")]
+    late = diagnose_by_roles(
+        [log(gear, day=2, start=0.7, name="h")], gear, baselines=base, faults=few, false_alarm=1e-3
+    )
+    assert late.status == "healthy"
+    early = diagnose_by_roles(
+        [log(gear, day=1, start=0.7, name="h")], gear, baselines=base, faults=few
+    )
+    assert max(abs(item.score) for item in early.features) < 0.5  # its own day, begun later
+    blind = {(item["kind"], item["place"]): item["reason"] for item in late.unobservable}
+    assert "moves nothing" in blind["release_cable_failed", "release"]
+    dead = {"kind": "proximity_off", "place": "sensor.proximity_25", "severity": 1}
+    answer = diagnose_by_roles([log(gear, dead, day=3, name="f")], gear, baselines=base, faults=few)
+    assert (answer.status, answer.best) == ("faulty", ("proximity_off@sensor.proximity_25",))
+
+
+def test_a_baseline_that_is_itself_faulty_is_left_out(screw):
+    worn = {"kind": "friction", "place": "transmission", "severity": 5.0}
+    base = [log(screw, worn, day=4, name="wrong"), log(screw, day=4, name="right")]
+    few = ["backlash@transmission", "gain_drift@control.position"]
+    for baselines, named in ((base[:1], ["wrong"]), (base[1:], [])):
+        result = diagnose_by_roles(
+            [log(screw, day=2, name="h")], screw, baselines=baselines, faults=few
+        )
+        left_out = [text for text in result.findings if "looks faulty" in text]
+        assert [text.split()[1] for text in left_out] == named
+
+
+def test_a_log_is_read_from_its_first_command(screw, gear):
+    first, late = (role_log(log(screw, start=s), screw) for s in (0.3, 0.412))
+    assert same_test(first, late)
+    short = min(first.seconds, late.seconds)
+    first, late = first.within(short), late.within(short)
+    np.testing.assert_allclose(first.log.time, late.log.time, atol=1e-12)
+    commands = [item.log["command"] for item in (first, late)]
+    np.testing.assert_allclose(*commands, atol=8e-5)  # the kink at the start
+    extend = role_log(log(gear), gear)
+    assert extend.command[0][-1] == pytest.approx(0.0, abs=1e-9)
+    assert extend.log.time[0] == pytest.approx(-0.1)
+
+
+def test_a_ramp_is_seen_to_begin_between_two_samples(screw):
+    """Whatever of its first samples is too near its start to count."""
+    time = np.arange(2000) / 500.0
+    for start in (0.3001, 0.3009, 0.3017):
+        ramp = 0.05 * np.clip(time - start, 0.0, 1.0)
+        assert _onset(time, ramp, sequence=False, name="x") == pytest.approx(start, abs=1e-9)
+
+
+def test_a_load_is_read_over_the_stroke_and_its_noise_is_none(gear):
+    rng = np.random.default_rng(3)
+    time = np.arange(4000) / 500.0
+    position = 0.264 * time / time[-1]
+    knots = np.array([-2000.0, -1900, -1700, -1600, -1500, -1400, -1300, -1100, -800])
+    load = np.interp(position, np.linspace(0.0, 0.264, 9), knots) + rng.normal(0.0, 5.0, len(time))
+    residual, over = read_load(gear, time, {"load": load, "output_position": position})
+    assert over is not None
+    np.testing.assert_allclose(over.forces, knots, atol=3.0)
+    assert np.abs(residual[1]).max() < 20.0
+    settings = over.settings(gear)
+    causes = gear.parameters.value("load.force_3") * gear.parameters.value("load.factor")
+    assert settings["load.force_3"] == pytest.approx(causes - over.forces[3])
+    half = {"load": load[:2000], "output_position": position[:2000]}  # a gear that stops midway
+    assert load_alike((residual, over), read_load(gear, time[:2000], half), time[::20])
+    heavy = {"load": 1.3 * load, "output_position": position}
+    assert not load_alike((residual, over), read_load(gear, time, heavy), time[::20])
+    noise = rng.normal(0.0, 5.0, len(time))
+    assert read_load(gear, time, {"load": noise, "output_position": position}) == (None, None)
+
+
+def test_numbers_of_a_closed_form():
+    """Voltage R i + k w, current by dry friction and inertia, position by its gain."""
+    time = np.arange(0.0, 10.0, 0.01)
+    speed = 20.0 * np.sin(2.0 * time)
+    current = 3.0 * np.sign(speed) + 0.05 * np.gradient(speed, time)
+    channels = {
+        "torque_voltage": 0.9 * current + 1.1 * speed,
+        "torque_current": current,
+        "motor_speed": speed,
+        "speed_ref": speed,
+        "output_position": -speed / 500.0,
+        "state": np.where(time < 4.0, 0.0, 2.0),
+    }
+    units = {"torque_voltage": "V", "torque_current": "A", "motor_speed": "rad/s", "state": "1"}
+    units |= {"speed_ref": "rad/s", "output_position": "m", "command": "m"}
+    values = numbers_of(channels, np.zeros(len(time)), time, units, 4.0).values
+    assert values["torque_voltage: by speed"] == pytest.approx(1.1)
+    assert values["torque_voltage: by current"] == pytest.approx(0.9)
+    assert values["torque_current: by dry"] == pytest.approx(3.0, rel=1e-3)
+    assert values["torque_current: by acceleration"] == pytest.approx(0.05, rel=1e-3)
+    assert values["position error: by set point"] == pytest.approx(1.0 / 500.0, rel=1e-6)
+    assert (values["state: changes"], values["state: last change"]) == (1.0, pytest.approx(4.0))
+    assert "torque_current: by speed" not in values or values[
+        "torque_current: by speed"
+    ] == pytest.approx(0.0, abs=2e-3)
+
+
+def test_spread_keeps_what_is_linear_and_gives_each_number_its_rest():
+    rng = np.random.default_rng(0)
+    steps = np.linalg.qr(rng.standard_normal((400, 3)))[0] * 20.0  # unit covariance
+    draws = steps @ np.array([[1.0, 2.0, 0.0], [0.0, 0.0, 3.0], [0.0, 0.0, 0.5]])
+    steps = steps[:, :2]
+    want = [[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 9.25]]
+    np.testing.assert_allclose(spread_of(draws, steps), want, atol=0.05)
+
+
+def test_what_cannot_be_diagnosed_is_refused(screw):
+    good = log(screw)
+    with pytest.raises(InputError, match="role 'command'"):
+        role_log(replace(good, channels={"output_position": good.output}), screw)
+    with pytest.raises(UnknownNameError):
+        diagnose_by_roles([good], screw, faults=["backlash@moon"])
+    with pytest.raises(InputError, match="at least one"):
+        diagnose_by_roles([], screw)
+    idle = Scenario.from_dict({"duration": 2, "command": {"mode": "position"}})
+    with pytest.raises(InputError, match="nothing is commanded"):
+        run = simulate(screw, idle, fidelity="low", record="command,encoder_position@200 Hz")
+        role_log(Log.of(run, "x"), screw)
+
+
+@pytest.mark.parametrize("name", ["nasa-ballscrew", "pisa-landing-gear", "torino-rotary"])
+def test_every_fault_is_a_candidate_or_not_modelled_with_a_reason(name):
+    from elevon.faults import catalogue
+
+    actuator = Actuator.load(name)
+    answer = {(c.kind, p) for c in candidates_of(actuator) for p in (c.place, *c.same)}
+    answer |= {(item["kind"], item["place"]) for item in not_modelled_of(actuator)}
+    assert answer == {(r.kind, p) for r in catalogue(actuator.wiring) for p in r.places}
+    assert all(item["reason"] for item in not_modelled_of(actuator))
+    assert len(factors_of(actuator)) >= 4
+
+
+def test_the_command_line(screw, tmp_path, capsys):
+    path = tmp_path / "log.csv"
+    log(screw, day=5).recording.save(path)
+    code = main(["diagnose", str(path), "--actuator", "nasa-ballscrew", "--fault",
+                 "backlash@transmission", "--json",
+                 "--report", str(tmp_path / "page.html")])  # fmt: skip
+    assert code == 0
+    page = (tmp_path / "page.html").read_text()
+    assert "Signals against the healthy model" in page
+    assert "backlash@transmission" in page.partition("What these logs can tell")[2]
+    assert '"status": "healthy"' in capsys.readouterr().out
+    options = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
+    assert main(["diagnose", str(path), *options]) == 2
+
+
+def loaded_log(actuator, compliance, *faults, seconds=3.0, day=1, force=1500.0, name="s"):
+    """A sine against 1500 N; the output deflects by `compliance` times load over stiffness."""
+    unit = drawn(actuator, np.random.default_rng(day))
+    grid = np.arange(0.0, 4.0, 0.01)
+    force = force * np.clip(5.0 * np.cos(2.0 * np.pi * 0.7 * grid), -1.0, 1.0)
+    sine = {"kind": "sine", "amplitude": "12 mm", "frequency": "0.7 Hz"}
+    table = {"kind": "table", "times": grid.tolist(), "values": force.tolist()}
+    scenario = Scenario.from_dict({
+        "duration": seconds,
+        "command": {"mode": "position", "terms": [sine]},
+        "load": {"output": {"terms": [table]}},
+        "fault": list(faults),
+    })  # fmt: skip
+    names = "encoder_position,resolver_position,resolver_speed,speed_ref,current_q_meas"
+    made = simulate(unit, scenario, fidelity="low", record=f"command,{names}@200 Hz")
+    time = made.clock().time
+    load = np.interp(time, grid, force)
+    columns, units, roles = {}, {}, {}
+    for role in made.roles:
+        channel = made.role(role)
+        back = compliance * load / actuator.parameters.value("backlash.stiffness")
+        columns[role] = channel.values - (back if role == "output_position" else 0.0)
+        units[role], roles[role] = channel.unit, role
+    columns["load"], units["load"], roles["load"] = load, "N", "load"
+    return Log.of(Recording.build(time, columns, units, meta={"roles": roles}), name)
+
+
+def test_a_screw_that_gives_under_its_load_is_healthy_and_its_backlash_is_seen(screw):
+    few = ["backlash@transmission", "gain_drift@control.position"]
+    base = [loaded_log(screw, 1.0, name="base")]
+    healthy = diagnose_by_roles(
+        [loaded_log(screw, 1.0, day=2, name="h")], screw, baselines=base, faults=few
+    )
+    assert (healthy.status, healthy.findings) == ("healthy", ())  # its baseline is not left out
+    backlash = {"kind": "backlash", "place": "transmission", "severity": "60 um"}
+    worn = diagnose_by_roles(
+        [loaded_log(screw, 1.0, backlash, day=3, name="w")], screw, baselines=base, faults=few
+    )
+    assert worn.best == ("backlash@transmission",)
+    assert worn.faults[0].interval[0] < 6e-5 < worn.faults[0].interval[1]
+    stiff = [loaded_log(screw, 0.0, name="s")]  # its stiffness is uncertain by its own size
+    assert diagnose_by_roles(stiff, screw, baselines=stiff, faults=few).findings == ()
+    soft = [loaded_log(screw, 8.0, name="s")]
+    driven = [loaded_log(screw, -1.0, force=-1500.0, name="d")]
+    answer = diagnose_by_roles(driven, screw, baselines=driven, faults=few)
+    assert any("drives the output" in finding for finding in answer.findings)
+    assert "looks faulty" in diagnose_by_roles(soft, screw, baselines=soft, faults=few).findings[-1]
+
+
+def test_a_baseline_may_go_on_for_longer_than_the_log(screw):
+    short, long = (role_log(loaded_log(screw, 1.0, seconds=s), screw) for s in (1.5, 3.0))
+    assert same_test(short, long)
+    assert not same_test(long, short)
