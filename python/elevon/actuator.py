@@ -11,8 +11,6 @@ from typing import Any
 from elevon.parameters import ParameterSet, load_set, set_names
 from elevon.plain import Plain
 
-__all__ = ["Actuator", "list_actuators"]
-
 
 @dataclass(frozen=True)
 class Actuator(Plain):

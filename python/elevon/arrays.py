@@ -3,7 +3,5 @@
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Floats"]
-
 Floats = npt.NDArray[np.float64]
 """Numbers of double precision, of any shape."""

@@ -20,16 +20,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.scenario import Scenario
 
-__all__ = [
-    "Comparison",
-    "compare",
-    "compared_signals",
-    "default_scenario",
-    "default_start",
-    "filtered",
-    "run_pair",
-]
-
 Array = npt.NDArray[np.float64]
 
 ROLES = {"position": "output_position", "speed": "motor_speed", "q_current": "torque_current"}

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.scenario import Scenario
 
-__all__ = ["LOADS", "compare_loads", "load_size"]
-
 LOADS = {"as given": 0.0, "opposing": 1.0, "aiding": -1.0}
 """Name of each run and the sign of its load along the motion."""
 _RATE = 200.0  # Hz of the load's table

@@ -7,8 +7,6 @@ from html import escape
 
 from elevon.errors import unknown
 
-__all__ = ["Block", "diagram_svg", "diagram_text", "diagrams"]
-
 
 @dataclass(frozen=True)
 class Block:

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     Model = TypeVar("Model", bound=BaseModel)
 
-__all__ = ["Document", "check_depth", "dotted", "read_toml", "validated"]
-
 Location = tuple[str | int, ...]
 
 #: The kinds of plain value a key may hold, as pydantic names the branches of a union.

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.response import FrequencyResponse, LoopResponse
     from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 
-__all__ = ["bench", "compare", "effects", "response"]
-
 
 def bench(
     procedure: Procedure | str | os.PathLike[str],

@@ -15,8 +15,6 @@ from elevon.session import Session, SessionState
 from elevon.simulate.arguments import ActuatorLike
 from elevon.units import parse_quantity
 
-__all__ = ["ActuatorEnv"]
-
 
 class ActuatorEnv(gymnasium.Env[Floats, Floats]):
     """An actuator that follows a target, one action a period.

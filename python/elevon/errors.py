@@ -8,33 +8,6 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import ClassVar
 
-__all__ = [
-    "ArgumentTypeError",
-    "BusyError",
-    "DamageError",
-    "DivergedError",
-    "ElevonError",
-    "ElevonWarning",
-    "FindingWarning",
-    "FormatError",
-    "InputError",
-    "Interrupted",
-    "NotActingError",
-    "NotActingWarning",
-    "OutputError",
-    "OutputExistsError",
-    "RangeError",
-    "RetiredNamesWarning",
-    "SimulationError",
-    "UncheckedWarning",
-    "UnitError",
-    "UnknownNameError",
-    "did_you_mean",
-    "nearest",
-    "quoted",
-    "unknown",
-]
-
 _LONGEST_QUOTE = 60
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["APART", "EXTRAS", "missing_package"]
-
 #: Extra to the packages it brings, named as they are imported.
 EXTRAS = {
     "files": ("h5netcdf", "h5py", "pandas", "pyarrow", "xarray"),

@@ -16,22 +16,6 @@ from pathlib import Path
 
 from elevon.errors import FormatError, InputError, OutputError, OutputExistsError
 
-__all__ = [
-    "atomic_path",
-    "check_output",
-    "check_owned",
-    "journal",
-    "open_owned",
-    "owning",
-    "publish",
-    "read_regular",
-    "step",
-    "sync_folder",
-    "visible",
-    "write_bytes",
-    "write_text",
-]
-
 #: Folders that this process writes into and did not make alone: links below are refused.
 _owned: set[Path] = set()
 

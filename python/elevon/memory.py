@@ -7,8 +7,6 @@ from pathlib import Path
 
 from elevon.errors import InputError
 
-__all__ = ["available_bytes", "check_memory", "format_bytes"]
-
 #: Part of the available memory that one piece of work may take.
 _SHARE = 0.8
 

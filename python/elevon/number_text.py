@@ -11,15 +11,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.estimate import Estimate
 
-__all__ = [
-    "estimate_row",
-    "estimate_texts",
-    "interval_texts",
-    "quantity_text",
-    "severity_texts",
-    "written_unit",
-]
-
 _DIGITS = 5
 """Significant digits of a number whose interval is not known."""
 _SMALL, _LARGE = 1e-3, 1e7

@@ -28,19 +28,6 @@ import numpy as np
 
 from elevon.errors import FormatError, did_you_mean
 
-__all__ = [
-    "REMAINDER",
-    "STORED",
-    "WORKING",
-    "As",
-    "Plain",
-    "key",
-    "keys_of",
-    "plain",
-    "read_plain",
-    "units_of",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class As:

@@ -4,8 +4,6 @@ from collections.abc import Callable
 
 from elevon.errors import InputError
 
-__all__ = ["Progress", "part"]
-
 Progress = Callable[[float], bool]
 """Called with the done fraction (0 to 1); returns False when the work should stop."""
 

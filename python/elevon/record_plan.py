@@ -9,16 +9,6 @@ from dataclasses import dataclass
 from elevon.errors import InputError, unknown
 from elevon.units import parse_quantity
 
-__all__ = [
-    "DEFAULT_RECORD",
-    "GROUPS",
-    "MOST_STEPS",
-    "ClockPlan",
-    "clock_name",
-    "period_of",
-    "record_plan",
-]
-
 #: Solver steps are counted in whole numbers that a double holds exactly.
 MOST_STEPS = 9.0e15
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from elevon.report import Report
 
-__all__ = ["Result", "finite", "load", "read_json"]
-
 SCHEMA = "elevon/{}/{}"
 _MOST_BYTES = 2**28  # of a result's file
 

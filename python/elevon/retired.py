@@ -8,8 +8,6 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-__all__ = ["current", "mapped", "remark", "successors"]
-
 #: Old name, as a whole or up to the next dot or ``@``, to the present one.
 _NAMES = {
     "play": "backlash",

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-__all__ = ["LONGEST", "check_series", "read_series"]
-
 LONGEST = 256 * 2**20
 """Bytes of a table of points: some ten million rows."""
 

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
-__all__ = ["one_blas_thread"]
-
 _LOCK = threading.Lock()
 _LIMITS: list[Any] = []  # of the first who entered; the last who leaves lifts it
 _INSIDE = [0]

@@ -19,8 +19,6 @@ from elevon.errors import OutputError
 from elevon.files import atomic_path, check_output, sync_folder
 from elevon.worklog import digest
 
-__all__ = ["Transaction", "is_staged", "located", "settle"]
-
 _NAME = re.compile(r"\.(.+)\.([0-9a-f]{64})\.next")
 
 Files = Mapping[str, Mapping[str, Any]]

@@ -13,17 +13,6 @@ import numpy.typing as npt
 
 from elevon.errors import InputError, unknown
 
-__all__ = [
-    "TABLE",
-    "WaveRecord",
-    "check_repeated",
-    "check_values",
-    "complete",
-    "evaluate",
-    "unit_of",
-    "wave_records",
-]
-
 TABLE = "table"
 
 

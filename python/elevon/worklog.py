@@ -25,8 +25,6 @@ from elevon import files as disk
 from elevon.errors import BusyError, FormatError, InputError, OutputError
 from elevon.files import open_owned, owning, read_regular, write_text
 
-__all__ = ["LOCK", "Item", "WorkLog", "digest", "finished", "is_locked", "locked", "sweep"]
-
 LOCK = ".elevon.lock"
 """Name of the lock in a folder. A killed process leaves the file, but holds it no more."""
 

@@ -18,8 +18,6 @@ from elevon.results import Result
 if TYPE_CHECKING:
     from elevon.report import Report
 
-__all__ = ["EffectEstimate", "Effects", "effects_of"]
-
 
 @dataclass(frozen=True)
 class EffectEstimate(Plain):

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from elevon.analysis.effects import Effects
 
-__all__ = ["EQUAL_REPEATS", "effects_report", "half_normal", "pareto"]
-
 EQUAL_REPEATS = (
     "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
     "units); they count as one run"

@@ -10,8 +10,6 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["CoKriging", "Interpolator", "Kriging"]
-
 
 class Interpolator(Protocol):
     """Predicts a response from the factors, coded -1 to +1."""

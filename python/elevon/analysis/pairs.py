@@ -15,8 +15,6 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.campaign import Dataset
 
-__all__ = ["Pairs", "Samples", "pair", "samples_of"]
-
 
 @dataclass(frozen=True)
 class Samples:

@@ -14,8 +14,6 @@ from elevon.errors import InputError, unknown
 if TYPE_CHECKING:
     from elevon.campaign import Dataset
 
-__all__ = ["CampaignResponse", "VariedFactor", "read_response"]
-
 Ints = npt.NDArray[np.int64]
 
 

@@ -16,9 +16,6 @@ from elevon.errors import InputError, Interrupted
 from elevon.plain import Plain
 from elevon.results import Result
 
-__all__ = ["Study", "SurrogateScore", "study"]
-
-
 #: Part of the high points that is held out, and of the budget that co-kriging spends on high runs.
 _HELD_OUT, _HIGH_SHARE = 0.3, 0.5
 

@@ -11,9 +11,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["TermColumn", "blocks_matrix", "further_contrasts", "separate"]
-
-
 #: Columns whose correlation differs from 0 or 1 by less than this are not, or wholly, aliased.
 _EQUAL = 1e-9
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.bench.stand import ChannelSpec, Stand
     from elevon.recording import Recording
 
-__all__ = ["LOAD_CHANNEL", "acquire", "acquired_signals", "internal_steps"]
-
 LOAD_CHANNEL = "rig_force"
 """Channel of the role ``load``: force of the stand on the rod, positive opposes positive motion."""
 _LEAST = 25e3  # Hz of the simulated channels before the filter, so that relays' ripple is filtered

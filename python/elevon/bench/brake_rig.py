@@ -23,8 +23,6 @@ from elevon.scenario.scenario import Term
 from elevon.units import parse_quantity
 from elevon.waveforms import TABLE, evaluate, unit_of, wave_records
 
-__all__ = ["BrakeRig", "BrakeRun", "CellState", "brake_loop", "set_point"]
-
 
 @dataclass(frozen=True, slots=True)
 class BrakeRig:

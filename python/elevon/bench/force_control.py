@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.bench.procedure import ForceStep
     from elevon.bench.stand import ForceSpec
 
-__all__ = ["ForceLoop", "target_force"]
-
 _AT_REST = 1e-3  # m/s below which a direction fades: rest has none
 
 

@@ -11,8 +11,6 @@ from elevon.bench.procedure import SpringStep, WeightsStep
 from elevon.errors import InputError
 from elevon.units import parse_quantity
 
-__all__ = ["Springs", "Weights", "springs_of", "weights_of"]
-
 GRAVITY = 9.80665  # m/s2
 _EDGE = 0.01  # s a weight takes to come onto its cable. ASSUMED: lowered by hand on a stiff cable
 _BEARING = 0.015 * 0.020  # m, friction radius of the guide's bearing. ASSUMED: 0.015 at 20 mm

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from elevon.scenario import Scenario
     from elevon.scenario.scenario import Term
 
-__all__ = ["LoadedSetup", "loaded_setups", "run_loaded", "run_loaded_batch", "write_loaded"]
-
 _GRID = 1e-3  # s of the force table
 _FINE = 0.25  # of it between two samples of the motion
 _PASSES = 2  # runs of the reduced-order model from which the force is computed

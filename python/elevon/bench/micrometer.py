@@ -12,16 +12,6 @@ import numpy as np
 
 from elevon.errors import RangeError
 
-__all__ = [
-    "INTRINSIC_BACKLASH",
-    "MEASURED",
-    "centre_distance",
-    "geometric_backlash",
-    "measured_backlash",
-    "micrometer_for",
-    "total_backlash",
-]
-
 ZERO_READING = 14.0  # mm: the wheel in full mesh
 ZERO_DISTANCE = 108.43  # mm
 SLOPE = math.radians(45.0)  # of the slide

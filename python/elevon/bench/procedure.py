@@ -32,21 +32,6 @@ from elevon.errors import InputError, unknown
 from elevon.scenario.scenario import Command, Term
 from elevon.units import parse_quantity
 
-__all__ = [
-    "BacklashStep",
-    "BrakeStep",
-    "ForceStep",
-    "Procedure",
-    "RigStep",
-    "SettingsStep",
-    "SpringStep",
-    "Step",
-    "TraceStep",
-    "WeightsStep",
-    "load_procedure",
-    "procedure_names",
-]
-
 Quantity = StrictInt | StrictFloat | StrictStr
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}\Z")
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.faults import Fault
 
-__all__ = ["Conditions", "Rig", "Setup", "draw_conditions", "moved", "setups"]
-
 RATE = 400.0  # Hz of the drive's trace (T1)
 _LONGEST_WAIT = 1.0  # s from the trace's start to the trigger, and from there to the command
 

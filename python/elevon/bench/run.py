@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from elevon.faults import Fault
     from elevon.recording import Recording
 
-__all__ = ["BenchLogFiles", "BenchResult", "claim_bench", "run_procedure", "state_file"]
-
 
 @dataclass(frozen=True)
 class BenchLogFiles(Plain):

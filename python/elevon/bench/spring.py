@@ -12,15 +12,6 @@ from dataclasses import dataclass
 
 from elevon.errors import InputError, RangeError
 
-__all__ = [
-    "INDEX_RANGE",
-    "STANDARD_WIRES",
-    "SpringDesign",
-    "SpringTask",
-    "design_spring",
-    "search_springs",
-]
-
 #: Preferred wire diameters of EN 10270-1 between 2 and 5 mm [m].
 STANDARD_WIRES: tuple[float, ...] = tuple(
     round(1e-3 * d, 6)

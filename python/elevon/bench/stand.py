@@ -13,8 +13,6 @@ from elevon.documents import read_toml, validated
 from elevon.errors import InputError
 from elevon.units import parse_quantity
 
-__all__ = ["ChannelSpec", "ForceSpec", "Stand", "stand_names", "stand_of", "stands"]
-
 Quantity = StrictInt | StrictFloat | StrictStr
 
 

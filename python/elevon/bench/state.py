@@ -12,8 +12,6 @@ from elevon.files import check_output
 from elevon.recording.description import description_path
 from elevon.worklog import Item, WorkLog
 
-__all__ = ["BenchState", "LogRecord", "finished_logs"]
-
 
 @dataclass(frozen=True, slots=True)
 class LogRecord:

@@ -22,9 +22,6 @@ from elevon.units import parse_quantity
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["cell_signals", "drive_signals", "recorded", "trace_files", "write_traces"]
-
-
 _LOGGED = {
     "encoder_position": "encoder_position",
     "resolver_position": "resolver_position",

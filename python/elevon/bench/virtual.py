@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from elevon.logs.log import Log
     from elevon.recording import Recording
 
-__all__ = ["first_trace", "traced"]
-
 
 def first_trace(procedure: Procedure) -> Procedure:
     """Return a procedure up to its first trace, with the unit's own backlash."""

@@ -16,8 +16,6 @@ from elevon.errors import InputError, unknown
 from elevon.files import read_regular, write_text
 from elevon.worklog import locked
 
-__all__ = ["ACTUATORS", "BENCHMARK", "BENCHMARK_VERSION", "SIZES", "Made", "make_benchmark"]
-
 #: Raised whenever the same seed and size give other data on purpose.
 BENCHMARK_VERSION = "1.0"
 BENCHMARK = "benchmark.json"

@@ -17,8 +17,6 @@ from elevon.benchmark.make import ACTUATORS, BENCHMARK
 from elevon.errors import InputError
 from elevon.files import read_regular, write_text
 
-__all__ = ["SCORES", "Score", "score_benchmark"]
-
 SCORES = "scores.json"
 
 #: A fault counts as present from this part of its severity at the end of life on.

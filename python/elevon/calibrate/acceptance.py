@@ -19,8 +19,6 @@ from elevon.parameters.relations import static_following
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["accept", "missing", "shortened", "undetermined", "with_values"]
-
 #: Offsets of sensors, which no parameter holds: they go with the actuator file's promises on logs.
 _OFFSETS = {
     "sensor.speed_offset": "motor_speed",

@@ -18,8 +18,6 @@ from elevon.estimate.covariance import numbered_strokes
 from elevon.estimate.residual import fit_residual
 from elevon.logs.log import Log
 
-__all__ = ["BacklashFit", "fit_backlash", "median_width", "through_backlash"]
-
 _TRAVEL = 3.0  # backlashes (or counts) of travel in both directions that a log must have
 _STRETCH = 0.5  # s: of a free output, within which a load is taken as constant (ASSUMED)
 _AGREE = 3  # stretches of one span at least

@@ -9,8 +9,6 @@ from dataclasses import replace
 from elevon.calibrate.backlash import BacklashFit, fit_backlash, median_width
 from elevon.logs.log import Log
 
-__all__ = ["PER_LOG", "backlashes_differ", "differing_backlashes", "pooled_backlash"]
-
 #: What may be estimated for each log on its own.
 PER_LOG = ("backlash.total",)
 _APART = 0.05  # relative difference of two backlashes that is one

@@ -20,8 +20,6 @@ from elevon.calibrate.motion import SmoothedMotion, delayed, dilated, lagged, mo
 from elevon.estimate.regression import Regression, huber, robust_cost, with_deviations
 from elevon.logs.log import Log
 
-__all__ = ["torque_balance"]
-
 Bools = npt.NDArray[np.bool_]
 _SLOW = 0.05  # of the highest speed: below it friction may stick
 _CLEARER = 0.2  # of the highest speed: the same, stricter

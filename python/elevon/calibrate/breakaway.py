@@ -16,8 +16,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.logs.log import Log
 
-__all__ = ["Breakaways", "breakaway_torque", "breakaways", "stuck_stretches"]
-
 Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # breakaways
 _MEDIAN = 1.2533  # deviation of a median over that of a mean

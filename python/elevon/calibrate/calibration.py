@@ -28,8 +28,6 @@ from elevon.threads import one_blas_thread
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["calibrate"]
-
 Bools = npt.NDArray[np.bool_]
 _RUN_IN = 1.0  # s at least before a log counts
 _RUNS = 0.35  # of the work: where model runs begin

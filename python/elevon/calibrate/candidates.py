@@ -15,8 +15,6 @@ from elevon.parameters.relations import emf_constant, motor_torque_constant, sta
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["AUTO", "candidates", "start_values", "within_inertia"]
-
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (
     "friction.dynamic",

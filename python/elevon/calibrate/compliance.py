@@ -19,8 +19,6 @@ from elevon.errors import InputError, RangeError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import huber, with_deviations
 
-__all__ = ["ComplianceCalibration", "calibrate_compliance"]
-
 
 @dataclass(frozen=True)
 class ComplianceCalibration:

@@ -15,8 +15,6 @@ from elevon.arrays import Floats
 from elevon.estimate.regression import huber
 from elevon.logs.log import Log
 
-__all__ = ["DirectEstimate", "direct_estimate", "saturated_speed"]
-
 _SLOW = 0.05  # of the highest speed: below it the direction of friction is not sure
 _WINDOW = 0.03  # s of the local parabolas that give acceleration
 

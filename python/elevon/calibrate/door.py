@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.simulate.arguments import ActuatorLike
 
-__all__ = ["calibrate", "validate"]
-
 
 def calibrate(
     logs: LogsLike,

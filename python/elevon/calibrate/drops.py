@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.slips import WeightDrop
 
-__all__ = ["is_drop_table", "run_drops"]
-
 COLUMNS = ("load_n", "motor_deg", "encoder_deg", "loss_deg")
 _MOST_BYTES = 10_000_000
 GUIDE_RADIUS = 0.08

@@ -26,8 +26,6 @@ from elevon.progress import Progress
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Dynamic", "dynamic_stage"]
-
 Bools = npt.NDArray[np.bool_]
 _ABSORBS = 0.02  # relative difference to the direct estimate that is worth a name
 _SIGMAS = 2.0  # deviations it must also exceed

@@ -17,8 +17,6 @@ from elevon.parameters.relations import motor_torque_constant
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["amplitude_findings", "plant_findings"]
-
 _CONVENTION = 0.05  # relative: how near a factor must be to sqrt 2 to be named
 _FACTOR = 0.002  # relative: a smaller amplitude factor is not worth a word
 _POOR = 0.8  # explained share below which a regression is doubtful

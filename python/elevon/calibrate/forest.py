@@ -11,8 +11,6 @@ from elevon.report.figures import COLOURS, new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["forest"]
-
 
 def forest(
     estimates: Sequence[Estimate], truth: Mapping[str, float] | None = None

@@ -23,8 +23,6 @@ from elevon.progress import Progress
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["HeldOut", "held_out"]
-
 Bools = npt.NDArray[np.bool_]
 _OFFSETS = ("sensor.current_offset",)
 _LAST = 0.25  # of a single log that is kept from the fit

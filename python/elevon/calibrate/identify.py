@@ -15,8 +15,6 @@ from elevon.estimate import Free
 from elevon.estimate.covariance import Ints, block_covariance
 from elevon.plain import Plain, key
 
-__all__ = ["Identifiability", "SensitivityTable", "choose", "rank"]
-
 Bools = npt.NDArray[np.bool_]
 _CORRELATED = 0.95
 _LOOSEST = 0.25  # relative deviation (or of ten meaningful changes) still worth freeing

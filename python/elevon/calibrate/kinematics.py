@@ -18,14 +18,12 @@ from elevon.calibrate.direct import saturated_speed
 from elevon.errors import InputError
 from elevon.estimate.covariance import block_covariance, joined, robust_covariance
 from elevon.estimate.residual import fit_residual
-from elevon.logs.command.fit import FREE, WaveformFit, best_waveform, fit_waveform
+from elevon.logs.command.fit import WaveformFit, best_waveform, fit_waveform
+from elevon.logs.command.guess import FREE
 from elevon.logs.command.known import NotedCommand, align_noted, noted_values
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.log import Log
 from elevon.waveforms import evaluate
-
-__all__ = ["KINEMATIC", "CommandFit", "command_fit", "speed_limit", "speed_sensor"]
-
 
 #: Paths that come from positions alone, not from the dynamic fit.
 KINEMATIC = (

@@ -25,8 +25,6 @@ from elevon.estimate.covariance import Strokes
 from elevon.estimate.regression import Regression, huber, regressed
 from elevon.logs.log import Log
 
-__all__ = ["controller_law"]
-
 Bools = npt.NDArray[np.bool_]
 _SETTLED = 0.25  # s around a saturated set point in which anti-windup may act
 _LEAST = 200  # samples

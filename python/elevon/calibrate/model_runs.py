@@ -14,8 +14,6 @@ from elevon.estimate.lanes import LaneChannel, Lanes
 from elevon.experiment import Experiment, Sensor, Variant, run_all
 from elevon.logs.log import Bools, Log
 
-__all__ = ["ModelRuns"]
-
 
 class ModelRuns:
     """What a fit moves, on the tests of some logs.

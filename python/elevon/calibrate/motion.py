@@ -15,18 +15,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.logs.log import Log
 
-__all__ = [
-    "SmoothedMotion",
-    "acceleration_of",
-    "delayed",
-    "dilated",
-    "integral",
-    "kernel",
-    "lagged",
-    "motion_of",
-    "smoothed",
-]
-
 Bools = npt.NDArray[np.bool_]
 _NOISE = 0.01  # of the acceleration's RMS that its noise may be
 _WIDEST = 0.02  # s, deviation of the smoothing kernel at most

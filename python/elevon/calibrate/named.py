@@ -11,8 +11,6 @@ from elevon.parameters.records import record_of, records
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["named"]
-
 
 def named(
     number: Estimate,

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.estimate import Estimate
 
-__all__ = ["calibration_card"]
-
 
 def calibration_card(
     before: Actuator,

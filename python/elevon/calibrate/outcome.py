@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from elevon.report import Report
 
-__all__ = ["Calibration", "LogFacts", "by_path", "log_facts"]
-
 
 class _Log(Protocol):
     """What an outcome asks of a log."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.validation import Validation
 
-__all__ = ["held_out_logs"]
-
 
 def held_out_logs(
     names: Sequence[str],

@@ -18,14 +18,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.calibrate.static import StaticFriction
 
-__all__ = [
-    "Torque",
-    "controller_estimates",
-    "plant_estimates",
-    "static_estimate",
-    "torque_scale",
-]
-
 _TIED = 0.01  # relative: closer than this the controller is taken to know the motor
 _SEEN = 3.0  # deviations from zero of a controller branch that exists
 _GIVEN = ("motor.emf_constant",)

@@ -27,8 +27,6 @@ from elevon.estimate.regression import Regression
 from elevon.estimate.residual import fit_residual, robust_weights
 from elevon.logs.log import Log
 
-__all__ = ["Presliding", "presliding_friction", "reversals", "usable_logs"]
-
 Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # reversals
 _MOST = 48  # reversals that are followed

@@ -14,8 +14,6 @@ from elevon.progress import Progress
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["held_out_agreement"]
-
 
 def held_out_agreement(
     logs: Sequence[Log],

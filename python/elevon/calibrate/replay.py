@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["as_recorded", "replayed", "unit_experiment", "validate_replay"]
-
 _INPUTS = ("command", "load")
 _SMOOTH = 0.5  # s over which the ram's imposed speed is taken from its position
 _SHORTEST = 64  # samples that a filter of the recorder needs

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import Validation, ValidationTrace
 
-__all__ = ["calibration_report", "validation_report"]
-
 #: How a quantity is shown, by its SI unit.
 _DISPLAY = {
     "rad": (180.0 / math.pi, "deg"),

@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 
 from elevon.data import read_table
 
-__all__ = ["Slip", "WeightDrop", "find_slips", "printed_drops"]
-
 _ROUNDING = 2e-5
 """Half a unit of the last printed digit of two positions and a loss, together [deg]."""
 _NEAR = 1e-3

@@ -22,8 +22,6 @@ from elevon.simulate.prepare import solver_step
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["SpeedRuns"]
-
 _STEP = 1e-4  # s: the reduced-order model's own 0.25 ms costs half a per cent of damping
 _SIGNALS = {"torque_current": "current_q_meas", "current_ref": "current_ref"}
 

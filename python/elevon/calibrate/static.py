@@ -20,8 +20,6 @@ from elevon.calibrate.presliding import presliding_friction, reversals, usable_l
 from elevon.estimate.regression import Regression
 from elevon.logs.log import Log
 
-__all__ = ["StaticFriction", "static_friction"]
-
 Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # reversals with a standstill
 _STUCK = 0.02  # s of a standstill at least

@@ -8,8 +8,6 @@ import numpy as np
 
 from elevon.calibrate.validation import SignalError, Validation
 
-__all__ = ["outliers", "thresholds"]
-
 _MARGIN = 2.0  # a threshold over the largest error seen on held-out data
 _APART = 5.0  # times the median over the logs: a log that is not like the others ...
 _BAD = 2.0  # ... and percent of the range: kinds of tests differ as much at small errors

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.report import Report
 
-__all__ = ["SIGNALS", "SignalError", "Validation", "validate"]
-
 Bools = npt.NDArray[np.bool_]
 
 #: Signals compared: name, unit.

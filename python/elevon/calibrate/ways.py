@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-__all__ = ["CalibrationRequest", "CalibrationWay", "turns", "way_of"]
-
 _LONG = 120.0  # s: a log of temperatures is no log of a motion to be predicted
 _NOT_COMPARED = "a log lacks a position: the closed loop is not compared"
 _FROM_THE_FIT = "thresholds: from the fit itself, since no log could be held out"

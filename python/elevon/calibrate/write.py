@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import Validation
 
-__all__ = ["calibrated_parameters", "set_text", "write_calibration"]
-
 
 def calibrated_parameters(result: Calibration) -> list[Parameter]:
     """Return the changed parameters with source, old value and interval."""

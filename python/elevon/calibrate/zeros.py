@@ -17,8 +17,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["gain_estimate", "position_estimates"]
-
 _OTHER = 0.005  # relative: a limit nearer the actuator file's than this is the actuator file's
 _ROUNDED = 0.1  # counts: what rounding to counts may shift where every stroke turns alike
 _TURNS = 0.2  # share of that in the encoder's gain

@@ -26,8 +26,6 @@ from elevon.worklog import Item, digest
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["block_name", "finish_block", "run_block", "simulate_block", "write_rows", "write_table"]
-
 Result = Mapping[str, Any]
 
 #: Rows of a row group: reading one run reads no more than some of these.

@@ -13,8 +13,6 @@ from elevon.memory import format_bytes
 from elevon.report import Report, ReportTable, Section
 from elevon.report.cells import markdown_text
 
-__all__ = ["card_texts"]
-
 _FAILED_LISTED = 20
 
 

@@ -24,8 +24,6 @@ from elevon.parameters.records import record_of
 from elevon.scenario import compile_scenario
 from elevon.simulate.acting import Notice, not_acting, report
 
-__all__ = ["Checked", "borders", "check", "check_memory"]
-
 #: A file of signals is about this large, and holds at most so many runs (whole SIMD batches).
 _FILE_BYTES, _FILE_RUNS = 16_000_000, 256
 

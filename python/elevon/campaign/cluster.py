@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from elevon.campaign.folder import CampaignWork
     from elevon.worklog import Item
 
-__all__ = ["in_cluster"]
-
 _LOCAL = re.compile(r"local:(\d+)")
 #: Workers of one machine, at most; more is a slip.
 _MOST_WORKERS = 1024

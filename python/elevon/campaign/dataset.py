@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from elevon.campaign.resolved import Resolved
     from elevon.recording import Recording
 
-__all__ = ["Dataset", "Table", "load_campaign", "load_run"]
-
 
 @dataclass(frozen=True)
 class Table:

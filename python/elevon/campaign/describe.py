@@ -11,8 +11,6 @@ import numpy.typing as npt
 from elevon.campaign.dataset import Dataset
 from elevon.errors import InputError
 
-__all__ = ["describe", "typical_runs"]
-
 _BINS = 20
 
 

@@ -11,8 +11,6 @@ from elevon.campaign.seal import packed, unpacked
 from elevon.campaign.store import SCHEMA, core_hash
 from elevon.worklog import Item, digest
 
-__all__ = ["block_description", "described_blocks", "described_item", "read_description"]
-
 KEY = b"elevon"
 
 

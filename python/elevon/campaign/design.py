@@ -31,8 +31,6 @@ from elevon.errors import InputError
 from elevon.files import read_regular
 from elevon.series import LONGEST
 
-__all__ = ["Points", "design_points"]
-
 Ints = npt.NDArray[np.int64]
 
 _ROMAN = {3: "III", 4: "IV", 5: "V", 6: "VI", 7: "VII", 8: "VIII"}

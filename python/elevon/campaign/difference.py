@@ -12,8 +12,6 @@ from elevon.campaign.resolved_file import LONGEST, resolved_text
 from elevon.campaign.store import RESOLVED
 from elevon.files import read_regular
 
-__all__ = ["difference"]
-
 _MOST = 3
 
 

@@ -16,9 +16,6 @@ from elevon.faults import find_record
 from elevon.parameters.records import record_of
 from elevon.units import check_kind, parse_quantity, parse_unit, si_unit, split_quantity, to_si
 
-__all__ = ["Column", "axis_values", "column_of", "random_values", "ranged", "read_values", "sample"]
-
-
 Values = npt.NDArray[Any]
 Ranged = Axis | Draw | Spread | Growth
 

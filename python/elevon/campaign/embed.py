@@ -15,8 +15,6 @@ from elevon.faults import Fault
 from elevon.files import read_regular
 from elevon.series import LONGEST, read_series
 
-__all__ = ["Embedder", "filled"]
-
 _FILE = re.compile(r"(file\s*=\s*)([^,()]+)")
 
 

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from elevon.campaign.resolved import Resolved
 
-__all__ = ["ENDS", "ends_table", "last_values", "read_ends"]
-
 ENDS = "ends"
 """Folder of the tables."""
 _OUTCOME = {

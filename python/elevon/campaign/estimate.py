@@ -18,8 +18,6 @@ from elevon.simulate.batch import checked_threads, simulate_prepared
 if TYPE_CHECKING:
     from elevon.campaign.folder import CampaignWork
 
-__all__ = ["Cost", "check_disk", "estimate"]
-
 #: Of a run, beside its solver steps: preparing it and writing its table (measured, one core).
 _RUN_SECONDS = 0.5e-3
 #: The pilot: so many runs at once, so much of each.

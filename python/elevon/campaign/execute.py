@@ -21,8 +21,6 @@ from elevon.errors import InputError
 from elevon.simulate.batch import checked_threads
 from elevon.worklog import Item, locked, sweep
 
-__all__ = ["CampaignResult", "resume_campaign", "run_campaign"]
-
 Report = Callable[[float], Any]
 
 

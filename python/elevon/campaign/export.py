@@ -17,8 +17,6 @@ from elevon.recording.formats import check_ending, files_of
 from elevon.recording.names import LONGEST_NAME
 from elevon.report.cells import quoted_columns
 
-__all__ = ["export", "identifiers", "run_numbers"]
-
 _ITEM = re.compile(r"(\d+)(?:-(\d+))?")
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from elevon.campaign.resolved import Resolved
 
-__all__ = ["feature_schema", "feature_table"]
-
 
 def feature_schema(resolved: Resolved, prepared: Prepared) -> pa.Schema:
     """Return the columns of the features' files, each with ``unit`` and ``text``."""

@@ -36,9 +36,6 @@ from elevon.record_plan import ClockPlan
 from elevon.transaction import Transaction, is_staged, settle
 from elevon.worklog import LOCK, Item, WorkLog, digest
 
-__all__ = ["CampaignWork", "begin", "drop_log", "finish", "finished", "open_folder"]
-
-
 _LONGEST = 2**30
 
 
@@ -343,6 +340,7 @@ def _check_build(folder: Path, manifest: Manifest) -> None:
 
 
 def new_manifest(resolved: Resolved, need: Cost) -> Manifest:
+    """Return the manifest with which a campaign's folder begins."""
     from elevon import _core
 
     clocks = {} if need.checked is None else need.checked.clocks

@@ -15,24 +15,6 @@ from pydantic import (
     model_validator,
 )
 
-__all__ = [
-    "Axis",
-    "Blocking",
-    "Case",
-    "Design",
-    "Draw",
-    "Factor",
-    "Growth",
-    "Number",
-    "Population",
-    "Power",
-    "Random",
-    "Role",
-    "Spread",
-    "Strict",
-    "Target",
-]
-
 Quantity = StrictInt | StrictFloat | StrictStr
 Number = StrictInt | StrictFloat
 Role = Literal["control", "nuisance"]

@@ -8,8 +8,6 @@ from typing import Any
 from elevon.campaign.plan import Plan
 from elevon.errors import InputError
 
-__all__ = ["MOST_RUNS", "check_counts"]
-
 #: Runs of a plan. ASSUMED: the table of ten million runs takes some 2 GB while a plan is resolved;
 #: a larger experiment is split into several plans.
 MOST_RUNS = 10_000_000

@@ -13,8 +13,6 @@ from elevon.simulate.result import fault_labels
 if TYPE_CHECKING:
     from elevon.campaign.dataset import Dataset
 
-__all__ = ["recorded"]
-
 
 def recorded(ds: Dataset, number: int) -> Recording:
     """Return one run of a data set; see `elevon.campaign.load_run`."""

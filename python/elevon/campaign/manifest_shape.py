@@ -12,8 +12,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
-__all__ = ["shape_error"]
-
 
 def _below(name: str) -> str:
     """Refuse a file's name that leads out of the folder."""

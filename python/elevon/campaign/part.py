@@ -11,8 +11,6 @@ from typing import Any
 from elevon.errors import FormatError
 from elevon.worklog import digest
 
-__all__ = ["Part"]
-
 
 @dataclass(frozen=True)
 class Part:

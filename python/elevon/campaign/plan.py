@@ -12,8 +12,6 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr, model_validator
 from elevon.campaign.grammar import Axis, Case, Design, Number, Population, Random, Strict
 from elevon.documents import Document, read_toml, validated
 
-__all__ = ["Plan", "checked_plan", "load_plan"]
-
 
 class Plan(Strict):
     """A campaign plan.

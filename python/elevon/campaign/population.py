@@ -16,8 +16,6 @@ from elevon.errors import InputError
 from elevon.parameters.records import record_of
 from elevon.units import parse_quantity
 
-__all__ = ["Units", "units_of"]
-
 
 @dataclass(frozen=True)
 class Units:

@@ -12,8 +12,6 @@ from elevon.arrays import Floats
 from elevon.campaign.grammar import Power
 from elevon.errors import unknown
 
-__all__ = ["power_rows"]
-
 
 def power_rows(
     request: Power,

@@ -40,8 +40,6 @@ from elevon.files import read_regular
 from elevon.transaction import Transaction, settle
 from elevon.worklog import Item, WorkLog, locked, sweep
 
-__all__ = ["repair", "repair_locked"]
-
 
 def repair(folder: Path) -> list[str]:
     """Rebuild the manifest, the resolved plan, the plan, the table of the runs and the log.

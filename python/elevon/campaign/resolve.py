@@ -25,9 +25,6 @@ from elevon.faults import Fault
 from elevon.scenario import Scenario
 from elevon.scenario.bare import check_units, with_texts
 
-__all__ = ["resolve_plan"]
-
-
 Quantity = tuple[Target, str, Any]
 
 

@@ -23,8 +23,6 @@ from elevon.scenario import Scenario
 from elevon.simulate import Run
 from elevon.simulate.prepare import Prepared, prepare
 
-__all__ = ["CaseChanges", "Index", "Resolved", "record_of_fault", "set_place"]
-
 Ints = npt.NDArray[np.int64]
 
 

@@ -31,8 +31,6 @@ from elevon.retired import current, mapped
 from elevon.transaction import located
 from elevon.worklog import Item
 
-__all__ = ["LONGEST", "plan_hash", "read_resolved", "rebuilt", "resolved_text"]
-
 LONGEST = 2**30
 """Bytes of a resolved plan."""
 SPLIT_IS_NO_PART = 3

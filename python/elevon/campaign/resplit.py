@@ -15,8 +15,6 @@ from elevon.files import read_regular
 from elevon.transaction import Transaction, settle
 from elevon.worklog import locked, sweep
 
-__all__ = ["resplit"]
-
 
 def resplit(
     folder: Path, shares: Mapping[str, float], *, by: str | None = None, seed: int = 0

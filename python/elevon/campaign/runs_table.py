@@ -15,8 +15,6 @@ from elevon.campaign.seal import packed
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["RUNS", "planned", "read_outcome", "read_table", "runs_table", "with_copy"]
-
 RUNS = "runs.parquet"
 
 

@@ -8,8 +8,6 @@ from threading import Thread
 
 from elevon.errors import InputError
 
-__all__ = ["LIMIT", "check_scheduler"]
-
 LIMIT = 10.0
 """Seconds within which a wrong address is reported, in all."""
 

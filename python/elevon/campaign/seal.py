@@ -9,8 +9,6 @@ import zlib
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["packed", "seal", "unpacked"]
-
 _LARGEST = 256 * 2**20
 """Bytes that a packed text may expand to."""
 

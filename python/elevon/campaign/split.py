@@ -14,8 +14,6 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.campaign.resolved import Resolved
 
-__all__ = ["dealt", "leaks", "split_index"]
-
 Groups = npt.NDArray[np.int64]
 
 

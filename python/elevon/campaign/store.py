@@ -17,8 +17,6 @@ from elevon.files import read_regular, write_text
 from elevon.retired import mapped
 from elevon.worklog import WorkLog
 
-__all__ = ["SCHEMA", "Manifest", "core_hash", "read_manifest", "repair_hint", "work_log"]
-
 SCHEMA = 3
 """Version of the folder's form, apart from the package's."""
 READ = (2, SCHEMA)

@@ -16,18 +16,6 @@ import numpy.typing as npt
 
 from elevon.errors import InputError
 
-__all__ = [
-    "Fraction",
-    "block_words",
-    "blocks_of",
-    "fraction",
-    "full",
-    "letters",
-    "plackett_burman",
-    "plackett_burman_runs",
-    "spelled",
-]
-
 Coded = npt.NDArray[np.float64]
 _MOST_FACTORS, _MOST_TRIED = 20, 20_000
 

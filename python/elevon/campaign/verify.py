@@ -16,8 +16,6 @@ from elevon.errors import FormatError, InputError
 from elevon.report import Check
 from elevon.worklog import Item
 
-__all__ = ["verify"]
-
 
 def verify(
     folder: str | os.PathLike[str], progress: Callable[[float], object] | None = None

@@ -10,8 +10,6 @@ import typer
 from elevon.cli.common import ForceOption, JsonOption, check_outputs
 from elevon.cli.output import answer, print_json, print_table, progress_bar
 
-__all__ = ["add_to"]
-
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
 ResponseOption = Annotated[
     str, typer.Option("--response", metavar="R", help="A feature, or a number of runs.parquet.")

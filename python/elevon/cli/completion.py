@@ -13,8 +13,6 @@ import typer
 
 from elevon.errors import ElevonError
 
-__all__ = ["actuators", "faults", "fidelities", "join_words", "parameters", "procedures", "signals"]
-
 _BREAKS = ("@", "=", ":")
 """Where bash cuts a word in two (its COMP_WORDBREAKS); zsh and fish hand over the whole word."""
 

@@ -11,8 +11,6 @@ from elevon.cli.common import JsonOption
 from elevon.cli.groups import NamingGroup
 from elevon.cli.output import print_json, print_table, progress_bar
 
-__all__ = ["add_to"]
-
 _make = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 
 

@@ -9,8 +9,6 @@ import typer.core
 
 from elevon.errors import nearest
 
-__all__ = ["NamingGroup", "UsageError"]
-
 # The root of the argument errors (bad option, missing argument, ...) of whichever click typer uses.
 UsageError: Any = typer.BadParameter.__mro__[1]
 

@@ -18,20 +18,6 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, NoReturn
 
-__all__ = [
-    "INTERRUPTED",
-    "TERMINATED",
-    "check",
-    "code",
-    "drop_output",
-    "ignore",
-    "leave",
-    "noticed",
-    "story",
-    "telling",
-    "watched",
-]
-
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes after Ctrl-C and after SIGTERM, with which schedulers and shutdowns end a process."""
 _LATER = 0.02  # s after which a lost exception is raised again: out of the place that lost it

@@ -10,8 +10,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-__all__ = ["table_lines"]
-
 _GAP = "  "
 _INDENT = "    "
 _LEAST_PROSE = 24

@@ -16,8 +16,6 @@ import numpy.typing as npt
 
 from elevon.errors import FormatError, quoted
 
-__all__ = ["dataset", "datasets", "is_hdf5", "opened", "text_attribute", "vector"]
-
 Check = Callable[[int], None]
 """Refuses a number of bytes that is too many."""
 

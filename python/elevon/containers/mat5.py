@@ -18,8 +18,6 @@ import numpy.typing as npt
 
 from elevon.errors import FormatError, quoted
 
-__all__ = ["Variable", "variables"]
-
 _MATRIX, _COMPRESSED = 14, 15
 _OPAQUE = 17
 _NUMBERS = range(6, 16)

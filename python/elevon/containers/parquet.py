@@ -13,8 +13,6 @@ import numpy.typing as npt
 
 from elevon.errors import FormatError, quoted
 
-__all__ = ["Columns", "columns", "declared_bytes", "is_numeric", "opened", "unit_of"]
-
 _BATCH = 65_536
 _LONGEST_TEXT = 40
 

@@ -9,8 +9,6 @@ from elevon.report.figures import COLOURS, new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["bench_figure"]
-
 # Title, second line, left edge, bottom edge, colour. Sheet: 0 to 10 across, -0.7 to 4 up.
 _BOXES = (
     ("Drive", "position, speed, current", 0.0, 2.6, "blue"),

@@ -19,8 +19,6 @@ from elevon.worklog import WorkLog, digest
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["STEPS", "FinishedSteps", "finished_steps", "inputs_of", "work_key"]
-
 Result = TypeVar("Result")
 LOG = "unfinished.log"
 _CODE = {".py", ".so", ".pyd", ".toml", ".csv", ".j2", ".css", ".js"}

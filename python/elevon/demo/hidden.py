@@ -9,8 +9,6 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.parameters.relations import torque_constant
 
-__all__ = ["RECOVERED", "hidden_actuator"]
-
 #: What the demonstration expects to find again, and how far a value may be off (relative). Of the
 #: inertias only the sum on the motor shaft acts, so the sum is what is held against the truth.
 RECOVERED: dict[str, float] = {

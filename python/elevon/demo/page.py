@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.calibrate.validation import ValidationTrace
     from elevon.demo.run import Demo
 
-__all__ = ["demo_report"]
-
 _DISPLAYED = {
     "encoder_position": ("encoder", 180.0 / math.pi, "deg"),
     "motor_speed": ("motor speed", 30.0 / math.pi, "rpm"),

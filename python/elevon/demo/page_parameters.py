@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from elevon.demo.run import Demo
     from elevon.report import Report
 
-__all__ = ["parameters_section"]
-
 _DISPLAYED = {"rad": "deg", "kg m2": "kg cm2", "1": ""}
 _LINEAR = 1.0  # percent up to which the axis of the errors is linear
 _SPACE, _MINUS = "\N{NO-BREAK SPACE}", "\N{MINUS SIGN}"

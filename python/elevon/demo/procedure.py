@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
 
-__all__ = ["HELD_OUT", "LOADED", "demo_procedure"]
-
 HELD_OUT = "held-out"
 """Name of the log that is kept from the calibration."""
 LOADED = "loaded"

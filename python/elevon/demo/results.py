@@ -12,8 +12,6 @@ from elevon.reproduce.backlash.table import BacklashRow
 if TYPE_CHECKING:
     from elevon.reproduce.backlash import BacklashResult
 
-__all__ = ["Backlashes", "Step"]
-
 
 @dataclass(frozen=True)
 class Step:

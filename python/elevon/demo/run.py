@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from elevon.logs.importing import ImportedLog
     from elevon.logs.log import Log
 
-__all__ = ["Demo", "demo_files", "run_demo"]
-
 _PAGES = ("report.html", "backlash.html", "calibrated.toml", "truth.json")
 
 

@@ -14,8 +14,6 @@ from elevon.demo.results import Step
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Story", "Work"]
-
 Result = TypeVar("Result")
 
 

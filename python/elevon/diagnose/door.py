@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from elevon.logs.read import LogsLike
     from elevon.simulate.arguments import ActuatorLike
 
-__all__ = ["METHODS", "diagnose", "monitor"]
-
 METHODS = ("model", "surrogate", "both")
 
 

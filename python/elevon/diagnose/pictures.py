@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from elevon.diagnose.engine.answer import Diagnosis, Moved
 
-__all__ = ["SignalPanel", "Traces", "features_figure", "named_faults", "traces_figure"]
-
 _POINTS = 800  # means drawn of a signal
 _MOST = 12  # features drawn, those that deviate most
 

@@ -19,21 +19,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = [
-    "Ints",
-    "Strokes",
-    "block_covariance",
-    "block_length",
-    "block_sums",
-    "correlated",
-    "joined",
-    "long_run_covariance",
-    "memory",
-    "numbered_strokes",
-    "robust_covariance",
-    "stroke_blocks",
-]
-
 Ints = npt.NDArray[np.int64]
 #: Instants and speeds of one log's samples in their order, and the log's period.
 Strokes = tuple[Floats, Floats, float]

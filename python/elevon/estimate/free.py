@@ -10,8 +10,6 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["Free", "bounds", "inner", "outer"]
-
 _LEAST = 0.02  # of a first value that does not change its sign
 
 

@@ -8,8 +8,6 @@ from typing import TypeVar
 from elevon.errors import InputError, Interrupted
 from elevon.progress import Progress, part
 
-__all__ = ["folds", "held_out"]
-
 T = TypeVar("T")
 M = TypeVar("M")
 R = TypeVar("R")

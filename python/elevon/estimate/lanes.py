@@ -18,8 +18,6 @@ from elevon.arrays import Floats
 from elevon.estimate.covariance import block_length, joined, memory
 from elevon.estimate.free import Free, bounds, inner, outer
 
-__all__ = ["SOFT", "LaneChannel", "Lanes", "Point"]
-
 #: Points of a fit to the channels of each, one after another as in `Lanes.channels`; None where a
 #: run left the finite numbers.
 Runs = Callable[[Sequence[Mapping[str, float]]], Sequence[Sequence[Floats | None]]]

@@ -10,8 +10,6 @@ from typing import Annotated, ClassVar
 
 from elevon.plain import WORKING, Plain, key
 
-__all__ = ["LEVEL", "Determined", "Estimate", "as_values", "quantile"]
-
 LEVEL = 0.90  # of every interval
 
 

@@ -11,8 +11,6 @@ from elevon.arrays import Floats
 from elevon.estimate.covariance import Ints, Strokes, block_covariance, numbered_strokes
 from elevon.estimate.number import Estimate
 
-__all__ = ["Regression", "huber", "regressed", "robust_cost", "with_deviations"]
-
 _HUBER = 1.345  # deviations beyond which a residual weighs less: 95 % efficient without outliers
 _ROUNDS = 20
 _SPREAD = 1.4826  # deviation over median size, of a normal distribution

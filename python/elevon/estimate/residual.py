@@ -18,8 +18,6 @@ from elevon.estimate.covariance import Strokes, block_covariance, numbered_strok
 from elevon.estimate.free import Free, bounds, inner, outer
 from elevon.estimate.number import Determined, Estimate
 
-__all__ = ["BalanceFit", "ResidualFit", "fit_balance", "fit_residual", "robust_weights"]
-
 Loss = Literal["linear", "soft_l1", "huber"]
 Residual = Callable[[Floats], Floats]
 _INSIDE = 1e-9  # of the bounds' distance, by which a start lies within them

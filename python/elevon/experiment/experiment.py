@@ -24,8 +24,6 @@ from elevon.simulate.prepare import Prepared, Run, prepare
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Experiment", "Variant", "run_all", "shown_by"]
-
 _CHUNK = 64  # runs held at once
 
 Progress = Callable[[float], Any]

@@ -12,8 +12,6 @@ from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.scenario import Scenario
 
-__all__ = ["Inputs", "Table"]
-
 #: Instants from the run's beginning [s] and values there; straight lines between.
 Table = tuple[Floats, Floats]
 

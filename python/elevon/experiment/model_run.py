@@ -10,8 +10,6 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.logs.log import Log, on_clock
 
-__all__ = ["ModelRun", "Sensor"]
-
 
 @dataclass(frozen=True)
 class Sensor:

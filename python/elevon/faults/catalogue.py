@@ -12,8 +12,6 @@ from elevon.errors import RangeError, UnknownNameError, nearest, unknown
 from elevon.retired import remark, successors
 from elevon.units import format_quantity, parse_quantity
 
-__all__ = ["FaultRecord", "catalogue", "find_record"]
-
 
 @dataclass(frozen=True)
 class FaultRecord:

@@ -12,8 +12,6 @@ from elevon.faults.catalogue import find_record
 from elevon.faults.grammar import pairs
 from elevon.faults.profile import Profile
 
-__all__ = ["Fault", "check_together"]
-
 Value = float | str
 
 _FORM = "KIND@PLACE=VALUE[unit][,attribute=value...][:profile(argument=value,...)]"

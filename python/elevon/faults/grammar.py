@@ -6,8 +6,6 @@ from typing import Any
 
 from elevon.errors import InputError
 
-__all__ = ["numbers", "pairs"]
-
 
 def pairs(text: str, place: str) -> dict[str, str]:
     """Read ``name=value,name=value``; raise `InputError` naming the part that is not so."""

@@ -13,8 +13,6 @@ from elevon.faults.grammar import numbers, pairs
 from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
 
-__all__ = ["Profile", "profile_records"]
-
 _FORM = re.compile(r"([A-Za-z_]+)\s*(?:\((.*)\))?", re.S)
 
 

@@ -13,8 +13,6 @@ from elevon.features.records import ALL, FeatureRecord, wanted_records
 from elevon.features.roles import assign_roles, comparable
 from elevon.recording import Clock, Recording
 
-__all__ = ["LogFeatures", "recording_features"]
-
 #: Part of a period by which the instants of an even clock may differ from it.
 _UNEVEN = 0.01
 

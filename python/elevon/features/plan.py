@@ -13,8 +13,6 @@ from elevon.features.roles import assign_roles, comparable
 from elevon.record_plan import period_of
 from elevon.scenario.compile import signal_records, signal_units
 
-__all__ = ["MOVING_SPEED", "FeaturePlan", "core_plan", "feature_plans"]
-
 #: Motor speed in rad/s above which the motor counts as moving, where nothing else is given.
 MOVING_SPEED = 1.0
 

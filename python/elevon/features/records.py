@@ -9,8 +9,6 @@ from functools import lru_cache
 
 from elevon.errors import unknown
 
-__all__ = ["ALL", "FeatureRecord", "families", "feature_records", "wanted_records"]
-
 #: Stands for every feature that the columns and the rate allow.
 ALL = "all"
 

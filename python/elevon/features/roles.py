@@ -8,8 +8,6 @@ from functools import cache
 from elevon import _core
 from elevon.errors import unknown
 
-__all__ = ["ROLES", "assign_roles", "comparable", "players"]
-
 #: The roles that features are made of, in the order of the core.
 ROLES: tuple[str, ...] = tuple(record["name"] for record in _core.feature_roles())
 

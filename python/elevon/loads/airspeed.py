@@ -12,8 +12,6 @@ from elevon.loads.atmosphere import (
     standard_atmosphere,
 )
 
-__all__ = ["AIRSPEED_KINDS", "AirspeedKind", "dynamic_pressure", "mach_number"]
-
 Array = npt.NDArray[np.float64]
 AirspeedKind = Literal["true", "equivalent", "calibrated", "mach"]
 AIRSPEED_KINDS: tuple[str, ...] = get_args(AirspeedKind)

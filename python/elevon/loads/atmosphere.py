@@ -13,8 +13,6 @@ import numpy.typing as npt
 
 from elevon.errors import RangeError
 
-__all__ = ["Atmosphere", "standard_atmosphere"]
-
 Array = npt.NDArray[np.float64]
 
 GRAVITY = 9.80665  # m/s2, exact by definition

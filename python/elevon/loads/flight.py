@@ -17,8 +17,6 @@ from elevon.loads.airspeed import AIRSPEED_KINDS, AirspeedKind
 from elevon.progress import Progress
 from elevon.units import check_kind, to_si
 
-__all__ = ["FlightData", "read_flight"]
-
 Array = npt.NDArray[np.float64]
 
 _LONGEST = 2**28

@@ -7,8 +7,6 @@ import numpy.typing as npt
 
 from elevon.errors import InputError, RangeError
 
-__all__ = ["HingeMoment"]
-
 Array = npt.NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from elevon.loads.atmosphere import standard_atmosphere
 from elevon.loads.flight import FlightData
 from elevon.loads.hinge import HingeMoment
 
-__all__ = ["LoadTable", "flight_load"]
-
 Array = npt.NDArray[np.float64]
 
 

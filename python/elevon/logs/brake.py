@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.logs.command.note import CommandNote
     from elevon.recording import Recording
 
-__all__ = ["Brake", "brake_of"]
-
 Known = Literal["torque", "force", "on", "off"]
 _MOVING = 0.1  # of the highest speed: slower than that a resistive torque is not at its level
 _SMOOTHING = 0.25  # s: the brake's level changes slowly, the cell's noise does not

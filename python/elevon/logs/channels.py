@@ -12,8 +12,6 @@ from elevon.logs.formats.table import FloatArray
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
-__all__ = ["examine_channels"]
-
 _CLIP_SHARE = 0.01
 _FREE_TRAVEL = 0.08  # rad at the output: more than the widest backlash the bench can set (0.0457)
 _CLIPPING = {"speed_ref", "motor_speed", "current_ref", "torque_current", "direct_current",

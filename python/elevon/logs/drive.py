@@ -10,8 +10,6 @@ from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.log import Bools, Log, bridged, per_log
 
-__all__ = ["RATE", "drive_log", "group_means", "groups_of", "thinned"]
-
 _LEAST_SAMPLES = 200
 _NEEDED = ("speed_ref", "motor_speed")
 _CURRENTS = ("torque_current", "current_ref")  # the measured one first

@@ -30,8 +30,6 @@ from elevon.recording.csv import joined_tables
 from elevon.recording.description import describes, description_path
 from elevon.scenario import Scenario
 
-__all__ = ["ImportedLog", "find_sidecars", "import_log", "same_rate"]
-
 _ROUNDING = 0.6  # ms: a clock written in whole ms jitters by half of one
 
 

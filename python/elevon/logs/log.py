@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.recording.channel import Channel
 
-__all__ = ["Bools", "Log", "StandSettings", "bridged", "on_clock", "per_log"]
-
 Bools = npt.NDArray[np.bool_]
 Value = TypeVar("Value")
 #: Roles by whose channel the clock is chosen, where no other is named.

@@ -16,8 +16,6 @@ from elevon.logs.maps.column_map import ColumnMap
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
-__all__ = ["LogsLike", "as_logs", "log_of", "read_drive_logs", "read_log", "read_logs"]
-
 #: A column map, its file or its name; None where the headers say what is what.
 MapLike = ColumnMap | str | Path | None
 #: One log or several, read already or by their files.

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-__all__ = ["Finding", "ImportReport"]
-
 Level = Literal["info", "warning"]
 
 

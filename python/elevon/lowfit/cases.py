@@ -13,8 +13,6 @@ from elevon.scenario import Scenario
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["FitCase", "default_cases", "named_cases"]
-
 ROTARY_FAULTS = (
     "short@motor.phase_a=0.1",
     "eccentricity_static@motor=0.2",

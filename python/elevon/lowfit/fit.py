@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["FREE", "LowFit", "fit_low"]
-
 Array = npt.NDArray[np.float64]
 
 FREE = {"low.band_ratio": (0.05, 1.0), "low.voltage_ratio": (0.3, 0.9)}

@@ -13,8 +13,6 @@ from elevon.parameters.write import write_set
 if TYPE_CHECKING:
     from elevon.lowfit.fit import LowFit
 
-__all__ = ["fitted_parameters", "write_fit"]
-
 
 def fitted_parameters(fit: LowFit) -> list[Parameter]:
     """Return one entry for each fitted number: source, old value, deviation over the cases."""

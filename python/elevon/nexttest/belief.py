@@ -18,8 +18,6 @@ from elevon.diagnose.engine.posterior import PRIOR_FAULTY, SECOND
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
 
-__all__ = ["Belief", "Possible", "read_result"]
-
 _LONGEST = 2**24  # bytes of a result; it has some ten thousand
 _LEAST = 1e-4  # weight that all sets have together that a result does not list
 _SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it

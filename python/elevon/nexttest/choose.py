@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["NextTest", "PossibleSet", "RankedTest", "next_test"]
-
 
 @dataclass(frozen=True)
 class RankedTest(Plain):

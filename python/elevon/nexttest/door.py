@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.simulate.arguments import ActuatorLike
 
-__all__ = ["next_test"]
-
 
 def next_test(
     actuator: ActuatorLike,

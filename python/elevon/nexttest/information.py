@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.nexttest.profiles import BenchProfile
 
-__all__ = ["expected_information", "likelihoods", "planned", "updated"]
-
 _DRAWS = 200  # outcomes of a test
 _SAMPLES = 64  # severities of a set of faults
 _KNOWN = {c.key: c for c in CANDIDATES}

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from elevon.bench.procedure import BrakeStep, Procedure, TraceStep, load_procedure
 from elevon.bench.virtual import first_trace
 
-__all__ = ["BenchProfile", "profiles"]
-
 
 @dataclass(frozen=True)
 class BenchProfile:

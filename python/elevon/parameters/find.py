@@ -8,8 +8,6 @@ from pathlib import Path
 from elevon.errors import InputError, UnknownNameError, unknown
 from elevon.files import visible
 
-__all__ = ["VARIABLE", "find_set", "is_shipped", "set_names", "set_paths"]
-
 #: Folders with more actuator files, separated like PATH.
 VARIABLE = "ELEVON_ACTUATORS"
 

@@ -17,8 +17,6 @@ from elevon.parameters.records import Record, records, wiring_names
 from elevon.parameters.set import ParameterSet
 from elevon.units import parse_quantity, split_quantity
 
-__all__ = ["SetFile", "load_set", "set_errors"]
-
 _HEADER_KEYS = (
     "name", "title", "wiring", "base", "references", "scenario", "compare", "validation",
 )  # fmt: skip

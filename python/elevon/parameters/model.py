@@ -14,8 +14,6 @@ from pydantic import (
     field_validator,
 )
 
-__all__ = ["ActuatorHeader", "Citation", "Compare", "ParameterEntry", "ValidationLimits"]
-
 Number = StrictInt | StrictFloat
 
 

@@ -7,8 +7,6 @@ from typing import Literal
 
 from elevon.units import format_quantity
 
-__all__ = ["CONFIDENCES", "Confidence", "Parameter"]
-
 Confidence = Literal[
     "published", "derived", "assumed", "calibrated", "unknown", "default", "override"
 ]

@@ -12,8 +12,6 @@ from typing import Any
 from elevon.errors import InputError, RangeError, UnknownNameError, did_you_mean, unknown
 from elevon.units import format_quantity, parse_quantity
 
-__all__ = ["Record", "positions", "record_of", "records", "wiring_names", "wirings"]
-
 
 @dataclass(frozen=True, slots=True)
 class Record:

@@ -8,16 +8,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-__all__ = [
-    "TORQUE_PER_FLUX",
-    "constant_is_tied",
-    "copper_loss",
-    "emf_constant",
-    "motor_torque_constant",
-    "static_following",
-    "torque_constant",
-]
-
 TORQUE_PER_FLUX = 1.5
 """Torque constant over back-EMF constant, peak values of a three-phase machine."""
 

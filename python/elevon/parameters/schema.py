@@ -7,8 +7,6 @@ from typing import Any
 
 from elevon.parameters.records import Record, records
 
-__all__ = ["json_schema"]
-
 
 def json_schema(wiring: str) -> dict[str, object]:
     """Return the JSON Schema (2020-12) of an actuator file of one wiring.

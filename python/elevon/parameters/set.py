@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from elevon.report.cards import Html
 
-__all__ = ["ParameterSet"]
-
 
 class ParameterSet(Mapping[str, Parameter]):
     """All parameters of one wiring: a mapping from path to `Parameter`.

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.parameters.parameter import Parameter
 
-__all__ = ["variant_text"]
-
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 _WIDTH = 100
 _HEAD = """\

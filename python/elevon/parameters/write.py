@@ -12,8 +12,6 @@ from elevon.files import write_text
 from elevon.parameters.parameter import CONFIDENCES, Parameter
 from elevon.units import to_display
 
-__all__ = ["updated_set", "write_set"]
-
 
 def updated_set(text: str, changes: Iterable[Parameter]) -> str:
     """Return the text of an actuator file with some entries replaced or added.

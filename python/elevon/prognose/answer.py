@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from elevon.report import Report
 
-__all__ = ["KnownFault", "OffLaw", "Prognosis", "Reserve", "survival"]
-
 
 @dataclass(frozen=True)
 class KnownFault(Plain):

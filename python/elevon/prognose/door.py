@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from elevon.report import Report
     from elevon.simulate.arguments import ActuatorLike
 
-__all__ = ["HistoryLike", "MissionLike", "fleet", "predict"]
-
 #: Inspections as the filters take them, or the use at each diagnosis and the diagnosis.
 _Seen = Sequence[tuple[float, Diagnosis]] | Sequence[Inspection | tuple[float, Diagnosis]]
 #: A folder of inspections, or one that is read, too.

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.prognose.mission import Mission
     from elevon.recording import Recording
 
-__all__ = ["exposure", "recorded_signals", "run_signals"]
-
 _RATE = 400.0  # Hz
 _ROLES = (
     "command",

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
     from elevon.prognose.law import Law
 
-__all__ = ["course_figure", "severity_unit", "survival_figure"]
-
 
 def severity_unit(unit: str) -> str:
     """Return the unit severities are displayed in: shares in percent, lengths in millimetres."""

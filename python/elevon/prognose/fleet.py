@@ -17,8 +17,6 @@ from elevon.results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Costs", "FleetPlan", "Visit", "fleet_figure", "plan_fleet"]
-
 _INSTANTS = 400  # at which a visit may be, of each unit's remaining life
 
 

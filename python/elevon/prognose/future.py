@@ -14,8 +14,6 @@ from elevon.prognose.mission import Usage
 from elevon.prognose.process import Process, UnitPopulation
 from elevon.prognose.requirement import SEVERITY
 
-__all__ = ["LASTING", "MODEL_ERROR", "Future", "crossing", "look_ahead"]
-
 MODEL_ERROR = 0.008
 """Deviation of what the calibrated model says of a requirement, over its threshold. Measured on
 units of other values, calibrated to about 1 %, against the switching model at the true end of

@@ -11,9 +11,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["Grid", "axis_points"]
-
-
 #: Points of each axis by the number of axes: at most 1 024 model runs a table.
 _POINTS = {1: 13, 2: 9, 3: 7, 4: 5, 5: 4, 6: 3}
 

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from elevon.logs.log import Log
     from elevon.prognose.law import Law
 
-__all__ = ["History", "HistoryEntry", "diagnosed", "read_history", "write_stamp"]
-
 #: A log and its column map: a file, or the name of one of the package's.
 MappedLog = tuple[Path, str | Path | None]
 

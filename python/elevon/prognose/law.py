@@ -11,8 +11,6 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.errors import RangeError, unknown
 
-__all__ = ["DRIVERS", "Coefficient", "Law"]
-
 Rate = Callable[[Floats, Mapping[str, Floats], Mapping[str, Any]], Floats]
 
 #: What one repetition of a mission does to the actuator: name to unit and text.

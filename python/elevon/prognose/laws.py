@@ -15,8 +15,6 @@ from elevon.arrays import Floats
 from elevon.errors import unknown
 from elevon.prognose.law import Coefficient, Law
 
-__all__ = ["LAWS", "find_law"]
-
 Drivers = Mapping[str, Floats]
 Values = Mapping[str, float | Floats]
 _DORMANT = 0.3  # ASSUMED: in as many units a fault does not grow to be seen

@@ -11,8 +11,6 @@ from elevon.errors import InputError
 from elevon.prognose.future import crossing
 from elevon.prognose.process import Process, UnitPopulation
 
-__all__ = ["Life", "run_to_failure"]
-
 _STEPS = 400  # a life, about
 _MOST = 4000
 

@@ -15,8 +15,6 @@ from elevon.units import parse_quantity
 if TYPE_CHECKING:
     from elevon.prognose.response import ResponseTables
 
-__all__ = ["Measured", "governing", "read_measured"]
-
 
 @dataclass(frozen=True)
 class Measured:

@@ -20,8 +20,6 @@ from elevon.report.figures import COLOURS, new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["metrics_figure"]
-
 _SHARES = (0.5, 0.6, 0.7, 0.8, 0.9)
 
 

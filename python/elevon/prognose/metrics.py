@@ -14,17 +14,6 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.errors import InputError
 
-__all__ = [
-    "Track",
-    "alpha_lambda",
-    "convergence",
-    "coverage",
-    "cumulative_relative_accuracy",
-    "prognostic_horizon",
-    "relative_accuracy",
-    "wilson",
-]
-
 
 @dataclass(frozen=True)
 class Track:

@@ -26,8 +26,6 @@ from elevon.prognose.requirement import Requirement
 from elevon.scenario import Scenario
 from elevon.units import parse_quantity
 
-__all__ = ["UNITS_OF_USE", "FaultGrowth", "Mission", "Usage"]
-
 Quantity = StrictInt | StrictFloat | StrictStr
 _NUMBERS = ("spread", "form_spread", "grain", "start", "start_spread", "dormant")
 UNITS_OF_USE = ("flights", "landings", "cycles", "hours")

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from elevon.prognose.law import Law
     from elevon.prognose.measured import Measured
 
-__all__ = ["COMMON", "SIGMAS", "Inspection", "Seen", "inspection"]
-
 SIGMAS = 1.6449  # of a 90 % interval's half width
 _DETECTED = 3.0  # deviations at which a severity counts as seen
 _AT_EDGE = 0.98

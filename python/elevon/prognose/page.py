@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
     from elevon.prognose.law import Law
 
-__all__ = ["prognosis_page", "sentence"]
-
 
 def sentence(result: Prognosis) -> str:
     """Return the answer in one sentence, and where the history contradicts the law, that."""

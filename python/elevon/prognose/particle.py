@@ -15,8 +15,6 @@ from elevon.prognose.measured import Measured, governing
 from elevon.prognose.observation import Inspection, Seen
 from elevon.prognose.process import Process, UnitPopulation
 
-__all__ = ["COUNT", "ParticleFilter", "resampled"]
-
 COUNT = 2000
 SURPRISE = 3.0
 _KERNEL = 0.08  # variance of what is drawn that is drawn anew, a lost share of the particles

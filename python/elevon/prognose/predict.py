@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from elevon.prognose.mission import Mission
     from elevon.prognose.process import UnitPopulation
 
-__all__ = ["LEVEL", "predict", "prognosis"]
-
 LEVEL = 0.9
 _SAMPLES = 2000
 _LEAST = 3  # inspections that saw a fault before its growth counts as known

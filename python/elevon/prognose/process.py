@@ -13,9 +13,6 @@ from elevon.errors import InputError
 from elevon.prognose.law import Law
 from elevon.prognose.response import ResponseTables
 
-__all__ = ["DRIFT", "Process", "UnitPopulation"]
-
-
 DRIFT = 0.05
 """Deviation by which the logarithm of a unit's growth factor wanders while its use grows e-fold.
 

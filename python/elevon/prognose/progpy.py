@@ -17,8 +17,6 @@ from elevon.errors import InputError
 from elevon.prognose.law import Law
 from elevon.prognose.process import Process, UnitPopulation
 
-__all__ = ["from_samples", "progpy_model", "to_samples"]
-
 
 def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> object:
     """Return a ``progpy.PrognosticsModel``.

@@ -16,8 +16,6 @@ from elevon.errors import InputError, UnitError, did_you_mean
 from elevon.scenario import Scenario
 from elevon.units import parse_quantity
 
-__all__ = ["MEASURES", "SEVERITY", "Measure", "Requirement", "RunSignals"]
-
 Quantity = StrictInt | StrictFloat | StrictStr
 SEVERITY = "severity"
 FAR = 2.0

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.mission import Mission
 
-__all__ = ["respond"]
-
 
 def respond(
     actuator: Actuator,

@@ -13,8 +13,6 @@ from elevon.prognose.law import Law
 from elevon.prognose.requirement import SEVERITY, Requirement
 from elevon.units import shown_unit, to_display
 
-__all__ = ["ResponseTables", "check_start"]
-
 
 @dataclass(frozen=True)
 class ResponseTables:

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.mission import Mission
 
-__all__ = ["Correction", "correction"]
-
 _POINTS = 5  # severities of each axis
 
 

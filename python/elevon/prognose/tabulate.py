@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from elevon.prognose.mission import Mission
     from elevon.scenario import Scenario
 
-__all__ = ["severity_grid", "tabulate"]
-
 _CHUNK = 128  # runs held in memory at once
 _LOADS = (0.5, 1.0, 2.0)  # factors on the mission's loads where the future may differ
 

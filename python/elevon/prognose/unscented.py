@@ -13,8 +13,6 @@ from elevon.errors import InputError
 from elevon.prognose.observation import Inspection
 from elevon.prognose.process import Process, UnitPopulation
 
-__all__ = ["UnscentedFilter"]
-
 _ALPHA, _BETA, _KAPPA = 0.5, 2.0, 0.0
 
 

@@ -10,8 +10,6 @@ from elevon.recording.clock import Clock, frozen
 from elevon.recording.names import check_name
 from elevon.units import check_kind, parse_unit, si_unit, to_display, to_si
 
-__all__ = ["Channel"]
-
 _LONGEST_TEXT = 1000
 
 

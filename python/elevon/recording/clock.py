@@ -11,8 +11,6 @@ from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.recording.names import check_name
 
-__all__ = ["Clock"]
-
 
 @dataclass(frozen=True, eq=False)
 class Clock:

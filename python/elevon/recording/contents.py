@@ -15,8 +15,6 @@ from elevon.recording.clock import Clock
 from elevon.recording.header import SCHEMA, Header
 from elevon.recording.old import with_present_names
 
-__all__ = ["Contents", "check_size", "header_bytes", "rebuild"]
-
 
 @dataclass(frozen=True)
 class Contents:

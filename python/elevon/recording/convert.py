@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from elevon.recording.recording import Recording
 
-__all__ = ["time_name", "to_arrow", "to_pandas", "to_xarray"]
-
 
 def time_name(recording: Recording, clock: str) -> str:
     """Return the name of a clock's dimension: ``time``, or ``time_NAME`` beside others."""

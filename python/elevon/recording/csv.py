@@ -44,8 +44,6 @@ from elevon.units import check_kind, to_si
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["check", "joined_tables", "load", "save", "tables"]
-
 OLD_MARK = "# elevon "
 """How a table began that had its description in the first line."""
 _COLUMN = re.compile(r'\s*"?\s*([A-Za-z][A-Za-z0-9_]*)\s*\[\s*([^\[\],"]*?)\s*\]\s*"?\s*')

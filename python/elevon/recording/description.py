@@ -20,15 +20,6 @@ from elevon.errors import DamageError, FormatError, InputError
 from elevon.files import journal, read_regular, write_text
 from elevon.recording.header import Header
 
-__all__ = [
-    "TableDescription",
-    "describes",
-    "description_path",
-    "read_description",
-    "sha256_of",
-    "write_description",
-]
-
 _WHAT = "Elevon recording"
 _LARGEST = 256 * 2**20
 

@@ -14,8 +14,6 @@ from elevon.recording.contents import Contents
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["ENDINGS", "check_ending", "check_target", "files_of", "load", "save"]
-
 ENDINGS = (".parquet", ".nc", ".csv", ".mat")
 
 

@@ -20,8 +20,6 @@ from elevon.errors import DamageError, FormatError, InputError, VersionError
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["SCHEMA", "ClockHeader", "Header", "plain"]
-
 SCHEMA = 3
 """Version of the files' layout, apart from the version of the package."""
 _READ = (2, SCHEMA)

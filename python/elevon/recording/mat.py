@@ -24,8 +24,6 @@ from elevon.recording.names import check_name
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["check", "read", "write", "write_structs"]
-
 _Array = npt.NDArray[np.float64]
 _Value = _Array | str | dict[str, _Array]
 

@@ -5,8 +5,6 @@ import re
 
 from elevon.errors import InputError
 
-__all__ = ["LONGEST_NAME", "check_name"]
-
 LONGEST_NAME = 31
 """MATLAB's limit for the fields of a version 5 file."""
 

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from elevon.recording.channel import Channel
     from elevon.recording.recording import Recording
 
-__all__ = ["recording_card"]
-
 
 def recording_card(recording: Recording) -> Html:
     """Return the HTML view of a recording: status, clocks, a line and a curve a channel."""

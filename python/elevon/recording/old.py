@@ -14,8 +14,6 @@ from elevon.retired import current, mapped
 if TYPE_CHECKING:
     from elevon.recording.contents import Contents
 
-__all__ = ["warn_of_old_names", "with_present_names"]
-
 
 def with_present_names(contents: Contents) -> Contents:
     """Return the contents of an old file with the present names; what is named so already stays."""

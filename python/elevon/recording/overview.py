@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.recording.channel import Channel
     from elevon.recording.recording import Recording
 
-__all__ = ["Band", "Panel", "bands", "overlaid", "overview", "spectra"]
-
 
 @dataclass(frozen=True)
 class Panel:

@@ -26,8 +26,6 @@ from elevon.recording.header import Header
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-__all__ = ["check", "read", "write"]
-
 _GROUP = 2**18
 
 

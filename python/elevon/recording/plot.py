@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from elevon.recording.recording import Recording
 
-__all__ = ["plot"]
-
 PICTURES = (".png", ".svg", ".pdf")
 _MOST_POINTS = 100_000
 """On a picture of some thousand pixels the extremes of this many slices look like all samples."""

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Recording"]
-
 MAX_BYTES = 8 * 2**30
 
 

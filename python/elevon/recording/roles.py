@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from elevon.recording.channel import Channel
     from elevon.recording.recording import Recording
 
-__all__ = ["channel_of", "roles_of"]
-
 
 def roles_of(recording: Recording) -> dict[str, str]:
     """Return role to channel name, of the channels that are there."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-__all__ = ["code_names"]
-
 
 @lru_cache
 def code_names(wiring: str, signal: str) -> dict[int, str]:

@@ -7,8 +7,6 @@ import numpy as np
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
 
-__all__ = ["cut"]
-
 
 def cut(
     channels: Iterable[Channel], clocks: Iterable[Clock], start: float, stop: float

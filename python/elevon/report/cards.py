@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["Html", "badge", "card", "sparkline", "table"]
-
 _GOOD, _BAD, _GREY, _LINE = "#1a7f37", "#b42318", "#777777", "#2066a8"
 
 _WIDTH, _HEIGHT = 140, 26

@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-__all__ = ["csv_cell", "markdown_text", "quoted_columns"]
-
 FORMULA = "=+-@\t\r"
 """A text that begins with one of these is read as a formula by spreadsheets."""
 

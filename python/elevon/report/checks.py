@@ -7,8 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Check", "all_passed", "verdict"]
-
 
 @dataclass(frozen=True, slots=True)
 class Check:

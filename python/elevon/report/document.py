@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-__all__ = ["Report", "ReportTable", "Section"]
-
 _SHOWN_ROWS = 20
 
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "inline_svg", "new_figure", "save_figure"]
-
 COLOURS: dict[str, str] = {
     "blue": "#2f7fd1",
     "orange": "#e0782f",

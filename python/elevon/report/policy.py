@@ -6,8 +6,6 @@ import re
 from base64 import b64encode
 from hashlib import sha256
 
-__all__ = ["policy"]
-
 
 def policy(*sources: str) -> str:
     """Return the policy of a page whose own scripts stand in some sources of ours.

@@ -18,9 +18,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.report.policy import policy
 
-__all__ = ["assets", "chart", "page", "thinned"]
-
-
 COLOURS = ("#2f7fd1", "#e0782f", "#2f9e6e", "#d1483c", "#8a6fd0", "#8a929d", "#b8860b", "#0f8b8d")
 """Of middle lightness, legible on white and near-black, distinct to the colour-blind."""
 

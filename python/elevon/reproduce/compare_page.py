@@ -13,8 +13,6 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from elevon.compare import Comparison
 
-__all__ = ["compare_report"]
-
 
 def compare_report(comparison: Comparison, actuator: str, *, date: str | None = None) -> Report:
     """Return the report of a comparison of an actuator named as on the command line."""

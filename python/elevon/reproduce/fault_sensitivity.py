@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.scenario import Scenario
 
-__all__ = ["ROTARY_FAULTS", "Sensitivity", "fault_sensitivity", "features"]
-
 Array = npt.NDArray[np.float64]
 
 ROTARY_FAULTS = (

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["HydraulicActuator", "HydraulicResult", "HydraulicRow", "reproduce_hydraulic"]
-
 TEMPERATURES = (-40.0, 20.0, 70.0)
 FACTORS = (0.0, 1.0, 1.5, 3.5)
 _BOTH = ("motor.winding_temperature", "lubricant.temperature")

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["CASES", "CaseRow", "LowFidelityResult", "reproduce_low_fidelity"]
-
 POSITION_LIMIT = 0.005
 CURRENT_LIMIT = 0.05
 

@@ -10,8 +10,6 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from elevon.lowfit import LowFit
 
-__all__ = ["lowfit_report"]
-
 
 def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Report:
     """Return the report of a fit of an actuator named as on the command line."""

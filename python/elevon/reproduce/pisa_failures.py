@@ -24,18 +24,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = [
-    "LISTED",
-    "PHASES",
-    "FailureRow",
-    "FailuresResult",
-    "Phase",
-    "failure_checks",
-    "judge",
-    "reproduce_failures",
-    "severities",
-]
-
 RECORD = (
     "state,fault_code,warning_code,locked,output_position,output_speed,nut_position,"
     "brake_released@500 Hz"

@@ -8,8 +8,6 @@ from elevon.report import Report, ReportTable
 from elevon.reproduce.pisa_failures import PHASES, FailureRow, FailuresResult
 from elevon.reproduce.provenance import provenance
 
-__all__ = ["failures_report", "matrix", "summary"]
-
 
 def summary(result: FailuresResult) -> tuple[list[str], list[list[str]]]:
     """Return headings and rows: a phase a row, how many faults were found, silent, unsafe."""

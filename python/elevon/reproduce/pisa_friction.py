@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["FrictionResult", "FrictionRow", "FrictionTrace", "reproduce_friction"]
-
-
 GRAVITY = 9.80665
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """Speeds of the tests [mm/s]."""

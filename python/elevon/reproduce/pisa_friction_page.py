@@ -15,8 +15,6 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["friction_report"]
-
 _PALETTE = tuple(COLOURS.values())
 _WAYS = (("extension", COLOURS["blue"]), ("retraction", COLOURS["orange"]))
 _HISTORIES = (

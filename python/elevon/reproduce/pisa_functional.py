@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["FunctionalResult", "FunctionalRow", "reproduce_functional"]
-
 
 @dataclass(frozen=True, slots=True)
 class FunctionalRow:

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["ACTUATOR", "CONDITIONS", "Condition", "Stroke", "run_strokes", "stroke_time"]
-
 ACTUATOR = "pisa-landing-gear"
 COMMANDED = 0.1
 """Time of the command [s]."""

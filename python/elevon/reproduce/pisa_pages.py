@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from elevon.reproduce.hydraulic import HydraulicResult
 
-__all__ = ["functional_report", "hydraulic_report"]
-
 _PALETTE = tuple(COLOURS.values())
 
 

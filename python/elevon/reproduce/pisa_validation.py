@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["DISPLAYED", "ValidationResult", "reproduce_validation"]
-
 SECONDS = {"extend": 14.0, "retract": 16.0}
 DISPLAYED = ("output_position", "motor_speed", "torque_current")
 """What the thesis compares: position, speed, current."""

@@ -11,8 +11,6 @@ from elevon.reproduce.pisa_validation import DISPLAYED, ValidationResult
 from elevon.reproduce.provenance import provenance
 from elevon.units import shown_unit, to_display
 
-__all__ = ["validation_page"]
-
 _AXES = {
     "output_position": ("Position [mm]", 1e3),
     "motor_speed": ("Motor speed [rad/s]", 1.0),

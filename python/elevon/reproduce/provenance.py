@@ -5,8 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 
-__all__ = ["provenance"]
-
 
 def provenance(command: str, **more: object) -> Mapping[str, object]:
     """Return version, interpreter and command line, and whatever else the caller names."""

@@ -21,8 +21,6 @@ from elevon.report import Check, verdict
 from elevon.scenario import Scenario
 from elevon.simulate import Run, simulate_batch
 
-__all__ = ["ACTUATORS", "Signature", "SignaturesResult", "reproduce_signatures"]
-
 ACTUATORS = ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear")
 RATE = 2000.0
 

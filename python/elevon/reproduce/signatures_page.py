@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from elevon.reproduce.signatures import Signature, SignaturesResult
 
-__all__ = ["signatures_page"]
-
 
 def signatures_page(result: SignaturesResult, date: str | None = None) -> Report:
     """Return the page: for each actuator a map of what changes, then fault by fault."""

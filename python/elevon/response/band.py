@@ -13,8 +13,6 @@ from elevon.plain import Plain, in_unit, key
 if TYPE_CHECKING:
     from elevon.response.estimate import FrequencyResponse
 
-__all__ = ["AgreementBand", "band_of"]
-
 _COHERENT = (
     0.5  # of the output's power: below it backlash, friction and limits decide, not the loop
 )

@@ -12,8 +12,6 @@ from elevon.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["bode_plot"]
-
 
 def bode_plot(
     frequency: Floats,

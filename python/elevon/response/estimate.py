@@ -17,8 +17,6 @@ from elevon.results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["FrequencyResponse", "estimate"]
-
 Complex = npt.NDArray[np.complex128]
 
 

@@ -20,8 +20,6 @@ from elevon.units import parse_quantity
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
 
-__all__ = ["LinearModel", "linearise"]
-
 Complex = npt.NDArray[np.complex128]
 _SMALLEST = 1e-4  # of the largest singular value: below it stands what is not linear
 

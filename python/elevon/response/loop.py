@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-__all__ = ["LOOPS", "LoopResponse", "loop_response"]
-
 Complex = npt.NDArray[np.complex128]
 LOOPS = ("position", "speed", "current")
 _LINES = 60  # some twenty in a decade: the phase turns little between two

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.plain import Plain, in_unit, key
 
-__all__ = ["Margin", "Margins", "margins"]
-
 Complex = npt.NDArray[np.complex128]
 LEVEL = 0.90
 _DRAWS = 400  # of the loop within its deviation: the ends of an interval to a twentieth of it

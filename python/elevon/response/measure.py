@@ -17,15 +17,6 @@ from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
 from elevon.units import parse_quantity, shown_unit
 
-__all__ = [
-    "METHODS",
-    "Multisine",
-    "frequencies",
-    "frequency_response",
-    "require_finished",
-    "scenario_of",
-]
-
 METHODS = ("multisine", "sweep")
 _MOST = 24  # lines of a multisine: about ten in a decade are read well from a plot
 _PERIODS = 2  # measured, after one in which the transient dies

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["HazardResult", "HazardRow", "SafetyResult", "judged", "safety"]
-
 WIRING = "landing_gear"
 CHUNK = 256
 """Runs of one batch: what is kept of them at a time."""

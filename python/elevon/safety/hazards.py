@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.safety.rows import Row
 
-__all__ = ["HAZARDS", "RECORD", "Hazard", "observe"]
-
 RECORD = (
     "state,fault_code,warning_code,command_refused,locked,released,output_position,nut_position,"
     "motor_speed,current_mean,brake_released@100 Hz"

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.safety.campaign import HazardRow, SafetyResult
 
-__all__ = ["safety_report"]
-
 
 def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None = None) -> Report:
     """Return the report of a campaign.

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["RATES", "rate"]
-
 _BEARINGS, _POSITION, _MOTOR, _CONNECTOR = 1.78e-5, 1.70e-5, 1.03e-5, 6.64e-7
 """Bearings, position sensor, brushless motor, power connector: T3 Table 1.1."""
 _SWITCH = 2e-6

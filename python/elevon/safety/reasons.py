@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from elevon.safety.rows import Row
 
-__all__ = ["reason"]
-
 _LOCK_SWITCH = "proximity_on@sensor.proximity_100"
 _ORDER = {"proximity_on@sensor.proximity_75", "proximity_on@sensor.proximity_25"}
 _HANGS = {

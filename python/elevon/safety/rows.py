@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from elevon.scenario import Scenario
 
-__all__ = ["ENVIRONMENTS", "PATTERNS", "STARTS", "Failure", "Row", "failures", "population"]
-
 Steps = tuple[tuple[float, str], ...]
 
 STARTS = (0.75e-3, 5e-3, 30e-3, 60e-3, 80e-3, 130e-3, 190e-3, 200e-3, 230e-3, 260e-3, 265.5e-3,

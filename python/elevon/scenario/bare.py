@@ -14,8 +14,6 @@ from elevon.errors import UnitError
 from elevon.units import ambiguous, is_ambiguous, shown_unit
 from elevon.waveforms import TABLE, unit_of, wave_records
 
-__all__ = ["check_units", "with_texts"]
-
 _SPEED = {"rig_speed": "m/s"}
 _OF_MODE = {"position": ("rad", "m"), "speed": ("rad/s",), "torque": ("N m",)}
 Finding = tuple[tuple[str | int, ...], Any, tuple[str, ...], tuple[str, ...]]

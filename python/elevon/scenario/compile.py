@@ -14,15 +14,6 @@ from elevon.scenario.scenario import Action, Scenario, Term, Terms
 from elevon.units import check_kind, parse_quantity, to_si
 from elevon.waveforms import TABLE, check_repeated, check_values, unit_of, wave_records
 
-__all__ = [
-    "CompiledScenario",
-    "compile_scenario",
-    "compile_term",
-    "port_units",
-    "signal_records",
-    "signal_units",
-]
-
 
 @dataclass(frozen=True)
 class CompiledScenario:

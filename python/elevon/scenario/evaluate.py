@@ -12,8 +12,6 @@ from elevon.scenario.compile import compile_term
 from elevon.scenario.scenario import Term
 from elevon.waveforms import TABLE
 
-__all__ = ["evaluate_terms"]
-
 
 def evaluate_terms(
     terms: Sequence[Term], unit: str, time: npt.ArrayLike, place: str = "command"

@@ -9,8 +9,6 @@ from elevon.report.cards import Html, card, table
 if TYPE_CHECKING:
     from elevon.scenario.scenario import Scenario, Term, Terms
 
-__all__ = ["scenario_card"]
-
 
 def scenario_card(scenario: Scenario) -> Html:
     """Return the HTML view of a scenario: command, loads, faults, duration."""

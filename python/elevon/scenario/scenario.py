@@ -28,8 +28,6 @@ from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
 from elevon.waveforms import TABLE, wave_records
 
-__all__ = ["Action", "Command", "Load", "Scenario", "Term", "Terms", "located"]
-
 Quantity = StrictInt | StrictFloat | StrictStr
 
 

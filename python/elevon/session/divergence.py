@@ -7,8 +7,6 @@ from typing import Any
 
 from elevon.errors import DivergedError
 
-__all__ = ["diverged_error", "diverged_runs"]
-
 
 def diverged_runs(core: Any, runs: int) -> set[int]:
     """Return the runs of a core session that have diverged."""

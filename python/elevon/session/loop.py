@@ -15,8 +15,6 @@ from elevon.session.values import callable_or_none, positive_seconds, text, text
 if TYPE_CHECKING:
     from elevon.session.session import Session
 
-__all__ = ["Controller", "run_loop"]
-
 Controller = Callable[["Session"], Any]
 
 

@@ -24,8 +24,6 @@ from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 from elevon.simulate.prepare import Run, prepare, solver_step
 from elevon.units import parse_quantity
 
-__all__ = ["Session", "Value"]
-
 _FOREVER = 4.0e15  # solver steps: a session has no end of its own
 
 

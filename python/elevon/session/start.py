@@ -13,8 +13,6 @@ from elevon.scenario import Scenario
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator
 from elevon.simulate.prepare import Run
 
-__all__ = ["SessionState", "fault_places", "runs_of"]
-
 
 @dataclass(frozen=True)
 class SessionState:

@@ -10,17 +10,6 @@ from elevon.arrays import Floats
 from elevon.errors import ArgumentTypeError, InputError
 from elevon.units import parse_quantity, shown_unit
 
-__all__ = [
-    "Value",
-    "callable_or_none",
-    "one_each",
-    "positive_seconds",
-    "quantity",
-    "text",
-    "texts",
-    "whole_steps",
-]
-
 Value = float | str | Sequence[float] | Floats
 
 

@@ -20,8 +20,6 @@ from elevon.scenario import Scenario
 from elevon.scenario.compile import CompiledScenario, compile_scenario
 from elevon.units import format_quantity
 
-__all__ = ["Notice", "check_values", "not_acting", "report", "together"]
-
 
 @dataclass(frozen=True)
 class Notice:

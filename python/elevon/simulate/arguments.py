@@ -10,8 +10,6 @@ from elevon.actuator import Actuator
 from elevon.errors import ArgumentTypeError, InputError
 from elevon.scenario import Scenario
 
-__all__ = ["ActuatorLike", "ScenarioLike", "as_actuator", "as_scenario"]
-
 ActuatorLike = Actuator | str | os.PathLike[str]
 ScenarioLike = Scenario | Mapping[str, Any] | str | os.PathLike[str] | None
 

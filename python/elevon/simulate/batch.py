@@ -14,15 +14,6 @@ from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 from elevon.simulate.prepare import Features, Prepared, Record, Run, prepare, prepare_named
 from elevon.simulate.result import build_recording
 
-__all__ = [
-    "Progress",
-    "batch_bytes",
-    "checked_threads",
-    "simulate",
-    "simulate_batch",
-    "simulate_prepared",
-]
-
 Progress = Callable[[float], Any]
 
 

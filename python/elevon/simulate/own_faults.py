@@ -16,8 +16,6 @@ from elevon.faults import FaultRecord, catalogue
 from elevon.parameters import records
 from elevon.parameters.records import positions, wirings
 
-__all__ = ["Resting", "own_faults", "resting", "shown_drives"]
-
 DRIVE = "drive.kind"
 
 

@@ -20,17 +20,6 @@ from elevon.simulate.acting import Notice, check_values, not_acting
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 from elevon.simulate.stroke import check_stroke
 
-__all__ = [
-    "Features",
-    "Prepared",
-    "Record",
-    "Run",
-    "check_fidelity",
-    "prepare",
-    "prepare_named",
-    "solver_step",
-]
-
 Record = str | Sequence[str] | None
 Features = str | Sequence[str] | None
 

@@ -14,8 +14,6 @@ from elevon.recording import Channel, Clock, Recording
 from elevon.scenario.compile import signal_records
 from elevon.simulate.prepare import Prepared, Run
 
-__all__ = ["build_recording", "fault_labels", "final_values"]
-
 
 def build_recording(
     run: Run,

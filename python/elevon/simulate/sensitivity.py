@@ -16,8 +16,6 @@ from elevon.simulate.acting import report
 from elevon.simulate.prepare import Prepared, Record, Run, prepare
 from elevon.simulate.result import build_recording
 
-__all__ = ["Sensitivities", "sensitivities"]
-
 
 @dataclass(frozen=True)
 class Sensitivities:

@@ -10,8 +10,6 @@ from elevon.errors import RangeError
 from elevon.scenario.compile import CompiledScenario
 from elevon.waveforms import TABLE, wave_records
 
-__all__ = ["check_stroke"]
-
 
 def check_stroke(compiled: CompiledScenario, actuator: Actuator) -> None:
     """Check the position command of an actuator that travels against its stroke.

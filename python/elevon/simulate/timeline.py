@@ -12,8 +12,6 @@ from elevon.recording.states import code_names
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["Event", "has_states", "timeline"]
-
 _CODES = ("command", "command_refused", "state", "fault_code", "warning_code")
 
 

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["gathered"]
-
 _DAY_SINGLE = 100  # number of the first day with a fault of `ASKED`
 _UNITS = 16  # of a block: what is run, and written, at a time
 _VERSION = 2

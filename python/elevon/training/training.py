@@ -18,8 +18,6 @@ from elevon.training.campaign import gathered
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["trained"]
-
 _LOW, _TEST = 100, 7  # added to the seed: units of the reduced-order model, and those that judge
 _RUNS = 0.7  # of the work
 

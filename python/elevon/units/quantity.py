@@ -12,22 +12,6 @@ from elevon.errors import InputError, RangeError, UnitError
 from elevon.units.table import DISPLAY, KINDS
 from elevon.units.unit import Unit, parse_unit, unit_names
 
-__all__ = [
-    "ambiguous",
-    "check_kind",
-    "convert",
-    "format_quantity",
-    "is_ambiguous",
-    "kind_name",
-    "known_units",
-    "parse_quantity",
-    "shown_unit",
-    "si_unit",
-    "split_quantity",
-    "to_display",
-    "to_si",
-]
-
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.,])\s*(.*?)\s*", re.S)
 _LONGEST = 100
 

@@ -4,18 +4,6 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-__all__ = [
-    "DISPLAY",
-    "KINDS",
-    "OFFSETS",
-    "PREFIXED",
-    "PREFIXES",
-    "PRODUCTS",
-    "SYMBOLS",
-    "WORDS",
-    "Dimension",
-]
-
 Dimension = tuple[int, int, int, int, int, int]
 """Exponents of length, mass, time, current, temperature, angle."""
 

@@ -23,8 +23,6 @@ from elevon.units.table import (
     Record,
 )
 
-__all__ = ["Unit", "parse_unit", "unit_names"]
-
 Value = TypeVar("Value", float, npt.NDArray[np.float64])
 
 

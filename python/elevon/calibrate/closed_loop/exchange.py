@@ -21,8 +21,6 @@ from elevon.estimate.lanes import Lanes, Point
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["exchanged"]
-
 GAIN, TIME = "control.position_gain", "control.integral_time"
 _ROUNDS = 8  # of the fit with the gains exchanged
 _DEVIATIONS = 3.0  # between two pairs: from here on the logs prefer one

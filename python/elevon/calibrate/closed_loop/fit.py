@@ -22,18 +22,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = [
-    "DECIDED",
-    "Fitted",
-    "Searched",
-    "as_given",
-    "choose",
-    "final_fit",
-    "parts_apart",
-    "refitted",
-    "search",
-]
-
 Check = Callable[[], bool]
 _STARTS = 32
 _KEEP = 3

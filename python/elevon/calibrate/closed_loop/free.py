@@ -16,16 +16,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = [
-    "CURRENT_GAIN",
-    "LOAD_SHARE",
-    "STRUCTURES",
-    "asked_for",
-    "free_list",
-    "in_set",
-]
-
-
 STRUCTURES = ("cascade", "pid")
 _LATEST = 2e-2  # s, lag of a current loop
 #: Static over dynamic friction: the fit's own variable, so that rest never holds less.

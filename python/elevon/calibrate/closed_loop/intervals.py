@@ -17,8 +17,6 @@ from elevon.estimate import Free
 from elevon.estimate.covariance import block_covariance
 from elevon.estimate.lanes import Lanes, Point
 
-__all__ = ["SILENT", "Knowledge", "known"]
-
 _SHARE = 0.2  # of a logarithm: a deviation above which a number is not determined
 _TENTH = 0.5  # of its meaningful size, for an offset or a delay
 _SILENT = 1.0  # deviations of all residuals together that a whole spread moves

@@ -14,8 +14,6 @@ from elevon.logs.log import Log, bridged, per_log
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["NAMES", "demand", "loop_log", "motion", "recorded_roles", "sigma", "unsigned", "window"]
-
 #: What a log may show, by role, and what the logger's delays and offsets are named by.
 NAMES: dict[str, str] = {
     "output_position": "position",

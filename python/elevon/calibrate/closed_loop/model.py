@@ -17,8 +17,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["LoopModel"]
-
 #: Role to the model's signal, the sensors' own; and first deviations, as shares of a channel's
 #: spread: what a fair model of an unknown drive leaves.
 _SIGNALS = {

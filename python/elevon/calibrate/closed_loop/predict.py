@@ -17,8 +17,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["held_out_errors", "predict", "traces_of", "units_of", "validate_loop"]
-
 _UNITS = {"position": "m", "speed": "m/s", "motor_position": "rad", "motor_speed": "rad/s",
           "current": "A", "voltage": "V"}  # fmt: skip
 _ROUNDS = 4

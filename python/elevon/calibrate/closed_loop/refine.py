@@ -25,8 +25,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["FALL", "load_share", "refined", "steps"]
-
 #: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
 #: 100 Hz settles it; half and twice as much are part of the intervals.
 FALL = 0.02

@@ -34,8 +34,6 @@ from elevon.threads import one_blas_thread
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["agreement", "calibrate_loop"]
-
 #: What scales with the torque constant that the current is read by.
 _SCALED = {
     "motor.inertia", "friction.dynamic", "friction.static", "friction.viscous", "load.constant",

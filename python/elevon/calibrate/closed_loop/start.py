@@ -13,8 +13,6 @@ from elevon.estimate import Free
 from elevon.estimate.free import inner
 from elevon.logs.log import Log
 
-__all__ = ["cloud", "first_values", "windows"]
-
 _WINDOW = 6.0  # s
 _SETTLE = 0.4  # s
 _PLACES = (0.6, 0.95)  # quantiles of unrest at which windows of a log are taken

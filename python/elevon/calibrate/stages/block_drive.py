@@ -26,8 +26,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Driving", "Motor", "driving", "motor_constants"]
-
 _START = 0.1  # s after the drive begins ...
 _END = 0.06  # ... and before it ends
 _SLOWEST = 100.0  # rad/s

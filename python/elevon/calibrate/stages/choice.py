@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["balanced", "preloaded"]
-
 
 def preloaded(actuator: Actuator) -> bool:
     """Whether the actuator has a preloaded screw with an efficiency in each direction."""

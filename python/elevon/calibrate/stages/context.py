@@ -18,8 +18,6 @@ from elevon.progress import Progress, part
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Context", "Stage", "run_stages"]
-
 C = TypeVar("C", bound="Context")
 _WIDE = 0.2  # of a value: a deviation above which it is not determined
 _NOISE = "the logs' noise is larger than its effect"

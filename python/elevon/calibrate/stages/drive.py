@@ -24,8 +24,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["drive"]
-
 _ROUNDS = 3  # of runs that correct the balances, at most
 _NOISES = 4  # draws of a run's noise, over which its readings are averaged
 _SETTLED = 0.25  # deviations: a change from which no further round is made

@@ -22,8 +22,6 @@ from elevon.threads import one_blas_thread
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["STAGES", "calibrate_parts"]
-
 _FIDELITIES = ("auto", "low", "high")
 _UNIT = "control.gain_extension"  # an actuator with a control unit of its own has it
 _PRELOAD = "screw.efficiency_aiding"  # a preloaded screw has it

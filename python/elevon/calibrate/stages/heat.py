@@ -24,8 +24,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["heat"]
-
 _COPPER = 0.05  # of a resistance from a datasheet
 _BIN = 2.0  # s over which channels are averaged
 _WINDOW = 20.0  # s of one reading of the resistance

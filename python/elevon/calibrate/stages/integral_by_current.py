@@ -30,8 +30,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["GIVEN", "NEEDS", "PATHS", "gains_by_current"]
-
 #: Roles that this way needs.
 NEEDS = ("torque_current", "motor_speed", "output_position")
 #: What the set point and the demand stand on.

@@ -23,8 +23,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["brake", "travels"]
-
 _BEFORE = (0.02, 1.0)  # s between nut and ram, over which both are held together
 _DELAYS = ("brake.release_delay", "brake.engage_delay")
 _DELAY = 0.5  # s: a change of the brake later than this is another one's

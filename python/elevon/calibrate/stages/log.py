@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-__all__ = ["MOTION", "motor_ratio", "role_log"]
-
 _FEWEST = 100  # samples
 #: What shows the motor's speed, the best first.
 MOTION = ("motor_speed", "motor_position", "output_speed", "output_position")

@@ -20,16 +20,6 @@ from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
 from elevon.logs.log import Log
 
-__all__ = [
-    "UNIT_NEEDS",
-    "position_loop",
-    "set_points",
-    "speed_control",
-    "stretches",
-    "unit_gains",
-    "with_starts",
-]
-
 Bools = npt.NDArray[np.bool_]
 _COLUMNS = ("gain", "integral", "set_point", "ramp")
 _SHORTEST = 100  # samples of a stretch

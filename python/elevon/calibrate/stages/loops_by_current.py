@@ -27,8 +27,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["loops_by_current"]
-
 PATHS = ("control.speed_gain", "control.position_gain", "control.integral_time")
 #: What they stand on.
 GIVEN = ("control.torque_constant", "control.speed_feedforward")

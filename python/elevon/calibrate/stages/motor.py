@@ -16,8 +16,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["load_side", "motor_constants"]
-
 _RATE = 5e-4  # relative: what rates and clocks of a stand leave open
 _WARMTH = 1.0  # K of the winding over the surface that no log of seconds shows
 _FEWEST = 300  # samples

@@ -9,8 +9,6 @@ import numpy as np
 
 from elevon.logs.log import Log, per_log
 
-__all__ = ["EXTENDING", "LOCKED", "RETRACTING", "Move", "connected", "moves_of", "rig_moves"]
-
 #: States of the control unit that mean a motion, and the state it ends in.
 EXTENDING, LOCKED, RETRACTING = 1, 2, 3
 _RIG_MOTION = 2e-3  # m at least that a rig has moved the ram

@@ -13,8 +13,6 @@ from elevon.calibrate.stages.rig_tables import (
 from elevon.calibrate.stages.rig_tests import RigTest, rig_tests
 from elevon.estimate import Estimate
 
-__all__ = ["friction"]
-
 _MASS = "screw.moving_mass"
 
 

@@ -14,16 +14,6 @@ from elevon.estimate import Estimate
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = [
-    "KNOTS",
-    "Knot",
-    "friction_knots",
-    "hanging_mass",
-    "harmonic_knots",
-    "hats",
-    "knots",
-]
-
 KNOTS = 8
 GRAVITY = 9.80665
 _SEEN = 0.98  # resolution from which a knot is determined by tests

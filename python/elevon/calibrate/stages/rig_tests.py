@@ -23,8 +23,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["HARMONICS", "RigTest", "rig_tests"]
-
 HARMONICS = 5
 _SETTLED = 0.3  # s left out: the rig's start
 _BAND = 0.25  # of the log's rate: a detent above it is damped by the recorder's filter

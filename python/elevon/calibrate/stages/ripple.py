@@ -16,8 +16,6 @@ from elevon.arrays import Floats
 from elevon.calibrate.stages.moves import moves_of
 from elevon.logs.log import Log
 
-__all__ = ["Ripple", "ripple_of"]
-
 _ROLES = ("motor_speed", "torque_voltage", "torque_current")
 _SMOOTH = 2.0  # samples of the Gaussian that leaves the ripple: nothing slower than five samples
 _LOCAL = 0.05  # s over which a ripple's energy is averaged; the median over a motion drops ramps

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["corrected", "run_again", "with_noise"]
-
 _RATE = 25e3  # Hz at least of a run's channels, before the recorder's filter
 _SHARE = 0.1  # of a correction, as its deviation: ASSUMED, the model is not the machine
 _MOST = 0.3  # relative: a larger correction says that the run is another motion

@@ -26,8 +26,6 @@ from elevon.logs.log import Log
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["nut_force", "nut_loss", "relieved", "torque"]
-
 #: What is believed before the logs, as a share of the actuator file's value.
 _BELIEF = {
     "motor.inertia": 0.7, "friction.viscous": 3.0, "friction.dynamic": 1.0, "screw.preload": 1.0,

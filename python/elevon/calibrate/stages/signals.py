@@ -32,8 +32,6 @@ from elevon.progress import Progress, part
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["DRIVE_STAGES", "DriveContext"]
-
 _DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 _ENCODER = "sensor.encoder.wheel_ratio"  # an actuator with an encoder on its output shaft has it
 _RUNS = (0.35, 0.8)  # of the work: model runs

@@ -8,8 +8,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.logs.log import Log, per_log
 
-__all__ = ["CORNERS", "LOAD", "apart", "loaded", "quick", "slope", "smooth", "smoothed"]
-
 Bools = npt.NDArray[np.bool_]
 LOAD = ("load", "load_cell")
 _WIDTH = 0.05  # s of the polynomials that smooth all channels alike

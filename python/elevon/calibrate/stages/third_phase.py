@@ -16,8 +16,6 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["ThirdPhase"]
-
 _ANGLES = (np.arange(32) + 0.5) / 32.0  # shares of half a sector
 
 

@@ -22,8 +22,6 @@ from elevon.estimate.residual import BalanceFit, fit_balance
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["Constants", "TrainBalance", "torque_balance"]
-
 _INERTIA, _UNLOADED, _LOADED = (
     "motor.inertia", "screw.efficiency_unloaded", "screw.efficiency_loaded",
 )  # fmt: skip

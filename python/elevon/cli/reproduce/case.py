@@ -16,8 +16,6 @@ from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 if TYPE_CHECKING:
     from elevon.report import Report
 
-__all__ = ["Options", "PublishedCase", "Values", "add_command", "check_file", "print_columns"]
-
 Options = Mapping[str, Any]
 Values = dict[str, Any]
 

@@ -10,8 +10,6 @@ import typer
 from elevon.cli.output import answer, print_table, say
 from elevon.cli.reproduce.case import Options, PublishedCase, Values, check_file, print_columns
 
-__all__ = ["CASES", "low_fidelity"]
-
 _PICTURE = Annotated[
     Path | None, typer.Option("--picture", help="File for the summary plot: .svg, .png, .pdf.")
 ]

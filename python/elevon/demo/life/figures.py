@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.demo.life.results import LifeDemo
     from elevon.logs.log import Log
 
-__all__ = ["cone_figure", "diagnoses_figure", "remaining_figure", "signals_figure"]
-
 
 def cone_figure(demo: LifeDemo) -> Figure:
     """Draw the predicted end of life at each inspection: a cone that closes on the true one."""

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.demo.life.results import LifeDemo
 
-__all__ = ["Motion", "mechanism", "motion"]
-
 _FRAMES = 100
 _SECONDS = 5.0  # one sweep of the mission
 _SWING = 3.0  # drawn degrees a degree of the flap

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from elevon.demo.life.results import InspectionVisit, LifeDemo
 
-__all__ = ["lead", "life_report", "moving_picture"]
-
 
 def lead(demo: LifeDemo) -> str:
     """Return the sentence to remember, from the inspection nearest to 70 % of life."""

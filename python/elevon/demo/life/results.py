@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine import Diagnosis
     from elevon.prognose import Inspection, Prognosis, ResponseTables
 
-__all__ = ["InspectionVisit", "LifeDemo", "Statement"]
-
 
 @dataclass(frozen=True)
 class Statement:

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from elevon.logs.log import Log
     from elevon.prognose import Prognosis
 
-__all__ = ["life_files", "run_life"]
-
 _PAGES = (
     "report.html",
     "calibrated.toml",

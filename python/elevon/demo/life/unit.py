@@ -22,17 +22,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = [
-    "INSPECTED",
-    "demo_mission",
-    "faults_at",
-    "hidden_unit",
-    "live",
-    "mission_file",
-    "of_day",
-    "other_law",
-]
-
 INSPECTED = 330.0
 """Flights between inspections, about."""
 _FACTORS = (1.35, 0.7)

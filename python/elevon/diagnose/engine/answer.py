@@ -15,18 +15,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.pictures import Traces
     from elevon.report import Report
 
-__all__ = [
-    "SEEN",
-    "Alternative",
-    "Cause",
-    "Diagnosis",
-    "Explanation",
-    "FaultPlace",
-    "Moved",
-    "Reason",
-    "SuspectedFault",
-]
-
 SEEN = 3.0  # deviations that a fault's shift must reach to be observable
 
 

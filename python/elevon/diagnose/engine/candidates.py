@@ -12,8 +12,6 @@ from elevon.errors import InputError, unknown
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["CANDIDATES", "CandidateFault", "chosen", "of_a_magnet"]
-
 _LAW = "motor.eccentricity_law"
 
 

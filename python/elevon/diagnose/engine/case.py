@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["LogCase", "case_of", "detector_of", "joined", "shift_of", "uncertainty_of"]
-
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _SAME = 0.2  # relative difference of two logs' motion up to which they are one test
 _NOTED = 0.02  # of two noted parameters

@@ -12,8 +12,6 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["Detector"]
-
 _DRAWS = 20_000
 
 

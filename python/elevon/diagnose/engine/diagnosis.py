@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["ANYWHERE", "answer_of", "check_request", "diagnose"]
-
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 
 

@@ -21,16 +21,6 @@ from elevon.diagnose.engine.case import LogCase, joined, shift_of, uncertainty_o
 from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
 from elevon.diagnose.positions.features import UNITS
 
-__all__ = [
-    "NO_CANDIDATE",
-    "alternatives",
-    "causes",
-    "explanations",
-    "limits",
-    "moved",
-    "unexplained",
-]
-
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding

@@ -11,8 +11,6 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.replay import Replay
 from elevon.diagnose.positions.features import FeatureVector
 
-__all__ = ["DEGREES", "FLOOR", "MISMATCH", "POOLED", "Elsewhere", "Healthy", "healthy"]
-
 _FAR = 2.0  # deviations
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
 

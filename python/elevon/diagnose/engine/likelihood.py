@@ -16,17 +16,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import CandidateFault
 
-__all__ = [
-    "Frame",
-    "Hypothesis",
-    "healthy_alone",
-    "one_fault",
-    "outside",
-    "prior_density",
-    "second_faults",
-    "two_faults",
-]
-
 Shift = Callable[[str, Floats], Floats]
 SMALL = 0.05  # of the range: ASSUMED; severities below it are as frequent as each other
 _COARSE = 401

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["not_modelled"]
-
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
 _SWITCHES = tuple(f"inverter.{p}_{side}" for p in "abc" for side in ("high", "low"))

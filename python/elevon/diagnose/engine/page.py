@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.answer import Diagnosis
     from elevon.diagnose.pictures import Traces
 
-__all__ = ["diagnosis_page"]
-
 _DRAWN = 4  # logs
 
 

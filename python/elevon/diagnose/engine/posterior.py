@@ -26,8 +26,6 @@ from elevon.diagnose.engine.likelihood import (
     two_faults,
 )
 
-__all__ = ["Posterior", "marginals", "posterior", "quantiles"]
-
 Shift = Callable[[str, Floats], Floats]
 PRIOR_FAULTY = 0.5  # ASSUMED: a log is diagnosed since somebody doubts
 OTHER = 0.02  # ASSUMED: a faulty unit has a fault that is no candidate

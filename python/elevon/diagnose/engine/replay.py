@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = [
-    "SPREAD", "Replay", "ReplayUnit", "logged_features", "modelled", "replay", "runs",
-]  # fmt: skip
-
 _SIGNALS: Mapping[str, str] = {
     "output_position": "encoder_position", "motor_position": "motor_position",
     "speed_ref": "speed_ref", "motor_speed": "motor_speed", "current_ref": "current_ref",

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.answer import Diagnosis
     from elevon.logs.log import Log
 
-__all__ = ["traces_of"]
-
 
 def traces_of(logs: Sequence[Log], actuator: Actuator, result: Diagnosis) -> list[Traces]:
     """Return each log's signals beside the healthy model's and those with what is named.

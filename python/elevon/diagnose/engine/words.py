@@ -11,8 +11,6 @@ if TYPE_CHECKING:
 
     from elevon.diagnose.engine.answer import Cause, Diagnosis
 
-__all__ = ["UNEXPLAINED", "by_reason", "sentence", "severity_text"]
-
 _NAMES = {
     "backlash@transmission": "Backlash has grown by",
     "friction@transmission": "Dry friction has changed by",

@@ -10,8 +10,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError, did_you_mean
 
-__all__ = ["HealthyBaseline"]
-
 
 @dataclass(frozen=True, slots=True)
 class HealthyBaseline:

@@ -16,9 +16,6 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.errors import InputError
 
-__all__ = ["Discriminant"]
-
-
 SHRINKAGES = (0.1, 0.2, 0.4, 0.6)
 _TEMPERATURES = np.geomspace(0.5, 30.0, 25)
 _MARGIN = 0.5

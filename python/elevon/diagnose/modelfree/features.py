@@ -17,9 +17,6 @@ from elevon.diagnose.modelfree.strokes import LEAST_HOLD, StrokeSpan, find_strok
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording import Recording
 
-__all__ = ["FRICTION", "FULL", "MARKER", "TRANSFER", "FeatureTable", "feature_table"]
-
-
 _STARTS = {"breakaway": (0.12, 0.28), "recovery_1": (0.28, 0.52), "recovery_2": (0.52, 0.88),
            "recovery_3": (0.88, 1.44)}  # fmt: skip
 _STEADY, _BEFORE_STOP, _SETTLED, _BEFORE_START = 1.6, 0.08, 1.4, 0.04

@@ -20,8 +20,6 @@ from elevon.diagnose.modelfree.features import FULL, TRANSFER, FeatureTable, fea
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording import Recording
 
-__all__ = ["SHRINKAGE", "VIEWS", "ModelFree"]
-
 VIEWS = {"transfer": TRANSFER, "full": FULL}
 SHRINKAGE = {"transfer": 0.2, "full": 0.6}
 """Many features of few recordings need a scatter close to its diagonal."""

@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["accuracy", "confusion", "macro_f1", "resamples", "share_interval"]
-
 Codes = npt.NDArray[np.int64]
 
 

@@ -11,8 +11,6 @@ import numpy.typing as npt
 from elevon.errors import FormatError
 from elevon.recording import Recording
 
-__all__ = ["LEAST_HOLD", "LEAST_STROKE", "StrokeSpan", "find_strokes"]
-
 LEAST_STROKE = 2.6
 """Shortest stroke that is used [s]: 1.6 s until the start has passed, then 1 s of steady motion."""
 LEAST_HOLD = 2.4

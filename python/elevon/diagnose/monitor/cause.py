@@ -14,8 +14,6 @@ from elevon.diagnose.engine.posterior import quantiles
 from elevon.diagnose.monitor.filter import Change
 from elevon.diagnose.monitor.reference import WindowReference
 
-__all__ = ["likely_causes"]
-
 LISTED = 0.02
 _POINTS = 81
 _ZOOMS = 5

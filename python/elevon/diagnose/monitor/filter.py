@@ -20,8 +20,6 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["Change", "ChangeFilter", "WindowSpread"]
-
 
 @dataclass(frozen=True)
 class WindowSpread:

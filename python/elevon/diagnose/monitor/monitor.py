@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["Alarm", "Monitor", "MonitorStep", "Monitoring"]
-
 FALSE_ALARM_TIME = 3600.0  # s
 _WINDOWS = 40  # of a stream of unknown length, and the most that are simulated of a day
 _DAYS = 10  # the most that are simulated

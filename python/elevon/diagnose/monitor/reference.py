@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["MEMORY", "WindowReference", "reference"]
-
 MEMORY = 3600.0  # s, ASSUMED: time in which a day's temperatures and friction become another day's
 _MODELLED = 20.0  # s of a baseline that the model runs
 _LEAST = 3  # windows of the baselines together

@@ -10,8 +10,6 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.healthy import DEGREES
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 
-__all__ = ["AlarmThresholds", "simulated"]
-
 STREAMS = 2000
 _TAIL = 0.05  # share of the streams that gives the tail
 _LEAST = 10  # streams above a threshold that is read off; beyond, the tail is drawn on

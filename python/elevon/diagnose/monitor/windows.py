@@ -20,11 +20,6 @@ if TYPE_CHECKING:
     from elevon.logs.command.note import CommandNote
     from elevon.logs.log import Log
 
-__all__ = [
-    "CHANNELS", "cut", "motion", "of_samples", "period", "run_in", "stretch", "top_speed",
-    "window_features",
-]  # fmt: skip
-
 _LEAST = 400  # samples of a window that may be used
 _MOVING = 0.1  # of the highest speed
 #: Signals of a stream, by the names they have everywhere, and the role of each.

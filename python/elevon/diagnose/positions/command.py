@@ -22,8 +22,6 @@ from elevon.diagnose.positions.features import regress
 if TYPE_CHECKING:
     from elevon.logs.log import Log
 
-__all__ = ["NotedWaveform", "noted_command"]
-
 Bools = npt.NDArray[np.bool_]
 #: Unknown and instants to the phase [rad] and what the unknown does to it.
 Phase = Callable[[float, Floats], tuple[Floats, Floats]]

@@ -20,17 +20,6 @@ from elevon.diagnose.positions.lost_motion import carried, floats, spanned
 if TYPE_CHECKING:
     from elevon.logs.log import Log
 
-__all__ = [
-    "OWN_ERROR",
-    "SHARES",
-    "SIZES",
-    "UNITS",
-    "FeatureVector",
-    "features_of",
-    "median",
-    "regress",
-]
-
 Bools = npt.NDArray[np.bool_]
 Fit = tuple[Floats, Floats]  # weights, shape (k,), and their covariance, shape (k, k)
 

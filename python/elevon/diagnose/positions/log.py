@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["RUN_IN", "prepared"]
-
 RUN_IN = 1.0  # s left out: the start of the motion
 _RATIO = 0.05  # relative: a gear ratio seen in the log this far off is another actuator's
 _LEAST_TIME = 4.0  # s of log

@@ -9,8 +9,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["carried", "floats", "spanned"]
-
 Bools = npt.NDArray[np.bool_]
 _AFLOAT = 0.15  # of the difference's width: what it scatters in one direction if it is free
 _LEAST = 3e-4  # rad of that scatter: four counts of the bench's encoder, more than rounding leaves

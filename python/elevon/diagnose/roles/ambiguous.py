@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.answer import Cause, Diagnosis
     from elevon.diagnose.engine.candidates import CandidateFault
 
-__all__ = ["with_ambiguous"]
-
 ALIKE = 2.0  # deviations between two faults' shifts, the model's error among them
 _POINTS = 101
 

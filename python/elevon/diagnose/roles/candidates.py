@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.faults import FaultRecord
 
-__all__ = ["candidates_of", "counted_of", "not_modelled_of", "switched_of"]
-
 #: Largest severity considered where the catalogue's own is larger or none, by unit. ASSUMED: what a
 #: unit of this size runs with at all; shares and counts are given by the catalogue.
 _MOST = {"m": 0.002, "rad": 0.3, "N": 5000.0, "kg m2": 4e-4, "A": 2.0, "N m": 1.0}

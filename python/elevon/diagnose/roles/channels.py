@@ -21,16 +21,6 @@ from elevon.simulate.prepare import solver_step
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = [
-    "RoleUnit",
-    "as_on_stand",
-    "channels_by",
-    "deflection_under",
-    "driven",
-    "numbers_by",
-    "numbers_of_log",
-]
-
 _OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
 _ELASTIC = 1.0  # backlash.model: an elastic contact
 _PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time

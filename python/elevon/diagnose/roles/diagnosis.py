@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.candidates import CandidateFault
     from elevon.logs.log import Log
 
-__all__ = ["RoleCase", "diagnose_by_roles"]
-
 PAIRS = 16  # of faults at once that are scored
 OWN_ERROR = (
     0.15  # of what a fault does to one number: the reduced-order model shows sizes, not waveforms

@@ -12,8 +12,6 @@ from elevon.diagnose.positions.features import FeatureVector
 from elevon.diagnose.roles.numbers import KINDS, floors
 from elevon.diagnose.roles.runs import RoleReplay
 
-__all__ = ["healthy_of"]
-
 #: Of Student's distribution, nearly Gaussian. The least deviations are generous, so most numbers
 #: stand closer than stated; with few degrees that would count as a day of small spread, and what
 #: does vary would be called a fault.

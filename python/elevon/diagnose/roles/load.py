@@ -14,8 +14,6 @@ from elevon.diagnose.roles.series import lines, noise_deviation, smoothed
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["OverStroke", "load_alike", "read_load"]
-
 _SMOOTH = 0.05  # s over which a load is averaged before it becomes straight lines
 _ROUGH = 0.01  # of the load's size: what straight lines may miss
 _NOISE = 5.0  # deviations of its noise that a load's RMS must reach to be one

@@ -22,8 +22,6 @@ from elevon.logs.log import Log, bridged, on_clock
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["role_log"]
-
 _LEAST = 200  # samples
 _MISSING = 0.2  # share of samples above which a channel is left out
 _FASTEST = 1000.0  # Hz; faster logs are averaged down: the reduced-order model shows no more

@@ -15,8 +15,6 @@ from elevon.diagnose.roles.series import noise_deviation
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["noise_of"]
-
 _AGAIN = 8  # logs with noise added
 
 

@@ -14,8 +14,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["KINDS", "Kind", "Numbers", "floors", "numbers_of"]
-
 _SLOW = 100.0  # Hz of the means that levels and regressions are made of
 _PARTS = 6  # of a motion one way: what happens when
 _BOTH = 0.1  # share of the time in each direction from which on a motion goes both ways

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["BEFORE", "INPUTS", "RoleTest", "action_numbers", "same_test", "test_of"]
-
 #: What is put in, not measured.
 INPUTS = frozenset(["command", "load"])
 BEFORE = 0.1  # s before the onset that are read

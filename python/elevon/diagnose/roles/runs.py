@@ -28,8 +28,6 @@ from elevon.diagnose.roles.spread import daily, factors_of
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["RoleReplay", "replay_by_roles"]
-
 _DRAWS = 28
 #: Deviations of the days that are run over those stated: what sets in on a rare day is seen, and
 #: counts in full; what is linear counts as stated.

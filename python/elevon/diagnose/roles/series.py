@@ -6,8 +6,6 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-__all__ = ["averaged", "lines", "noise_deviation", "smoothed"]
-
 _NORMAL = 1.4826  # deviation over the median of the size, of Gaussian noise
 
 

@@ -10,8 +10,6 @@ if TYPE_CHECKING:
 
     from elevon.actuator import Actuator
 
-__all__ = ["DAILY", "daily", "drawn", "factors_of"]
-
 #: Deviation of what changes from day to day, by the end of a parameter's path, and how: added, a
 #: factor, or a factor of what an efficiency loses. ASSUMED, as for the rotary actuator where it is
 #: the same: 15 K of winding, 1 % of flux, friction by some percent, the supply's regulation; 10 K

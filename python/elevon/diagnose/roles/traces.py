@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.answer import Diagnosis
     from elevon.logs.log import Log
 
-__all__ = ["traces_by_roles"]
-
 #: Roles that are drawn, the first three of a log; lengths in mm.
 _DRAWN = (
     "output_position", "torque_current", "motor_speed", "supply_current", "torque_voltage", "state",

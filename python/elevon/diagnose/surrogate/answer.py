@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["diagnose_by_both", "diagnose_by_surrogate"]
-
 LISTED = 0.02  # probability below which a cause is not listed, and not proposed to the model
 LEAST_PROPOSED = 3  # causes that the model is given at least
 

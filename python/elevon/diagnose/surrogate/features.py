@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["NAMES", "SCALES", "VOLTAGE", "SurrogateFeatures", "changes", "log_features"]
-
-
 #: Keys of `elevon.diagnose.positions.features.UNITS`, in the surrogate's order.
 NAMES = (
     "lost_motion",

@@ -27,8 +27,6 @@ from elevon.diagnose.surrogate.table import TrainingTable
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.progress import Progress, part
 
-__all__ = ["TrainingPlan", "fitted", "scores"]
-
 FALSE_ALARM = 0.05
 HIGH = 0.25  # of a batch at least are runs of the switching model
 _KNOWN = 1000  # training runs kept to tell what is unlike them

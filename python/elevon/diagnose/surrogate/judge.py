@@ -15,8 +15,6 @@ from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, severities
 from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
 
-__all__ = ["judged", "judged_at"]
-
 Index = npt.NDArray[np.int64]
 
 

@@ -23,8 +23,6 @@ from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.errors import FormatError
 
-__all__ = ["Head", "LogOpinion", "Surrogate", "TestModel", "shipped"]
-
 _FORMAT, _VERSION = "elevon-surrogate", 2
 _MOST_BYTES = 50_000_000
 _TEST = 0.2  # relative difference of travel and speed up to which a log is of a test

@@ -15,16 +15,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = [
-    "Batch",
-    "Ensemble",
-    "Opinion",
-    "honest",
-    "loss_and_gradient",
-    "stored",
-    "train",
-]
-
 Numbers = npt.NDArray[Any]  # of double precision, but of single in training
 Weights = list[Numbers]  # w1, b1, w2, b2, ...
 HIDDEN = (44, 44)

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["packed", "unpacked"]
-
 _KINDS = {"half": np.float16, "single": np.float32}
 
 

@@ -22,11 +22,6 @@ from elevon.errors import InputError
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = [
-    "ALIKE", "FAULTS", "NOISE", "UnitDay", "build_of", "day_of", "drawn_faults", "learned",
-    "unit_of",
-]  # fmt: skip
-
 #: What the surrogate knows, in the order of its answers.
 FAULTS = (
     "backlash@transmission",

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-__all__ = ["Proposal", "proposed"]
-
 PRESENT, FAULTY = 0.09, 0.63  # shares of trained runs: of each fault, and of any
 SUSPECT = 0.01  # chance of a baseline below which it is called faulty
 

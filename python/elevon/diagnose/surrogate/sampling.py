@@ -15,8 +15,6 @@ from elevon.diagnose.surrogate.population import learned
 from elevon.diagnose.surrogate.table import TrainingTable
 from elevon.diagnose.surrogate.view import View, hidden
 
-__all__ = ["Rows", "limits", "severities", "sizes"]
-
 
 def limits() -> tuple[Floats, Floats]:
     """Return the ends of the faults' ranges: lowest (as a size) and highest, shape (f,)."""

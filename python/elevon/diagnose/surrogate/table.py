@@ -11,8 +11,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 
-__all__ = ["FAULTY_DAYS", "HEALTHY_DAYS", "SINGLE_FAULTS", "TESTS", "TrainingTable"]
-
 #: Procedures of the bench that are learned; the first trace of each, with the unit's own backlash.
 TESTS = ("backlash", "loaded")
 HEALTHY_DAYS = 3

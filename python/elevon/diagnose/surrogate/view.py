@@ -14,8 +14,6 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.diagnose.surrogate.features import NAMES, VOLTAGE, changes
 
-__all__ = ["VIEWS", "View"]
-
 VIEWS = ("relative", "absolute")
 _VOLTAGE = np.array([name in VOLTAGE for name in NAMES])
 _FOLLOWING = np.array([name == "following_gain" for name in NAMES])

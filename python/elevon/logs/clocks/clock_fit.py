@@ -22,8 +22,6 @@ import numpy.typing as npt
 
 from elevon.estimate.covariance import correlated, long_run_covariance
 
-__all__ = ["RESONATOR_STD", "RESONATOR_TOLERANCE", "ClockEstimate", "SharedLogs", "fit_clock"]
-
 FloatArray = npt.NDArray[np.float64]
 
 RESONATOR_TOLERANCE = 0.005

@@ -18,8 +18,6 @@ from elevon.logs.formats.table import FloatArray
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
-__all__ = ["join_loadcell"]
-
 
 def join_loadcell(
     recording: Recording,

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import SharedLogs
 
-__all__ = ["LEAST_R2", "OffsetGuess", "search_offset"]
-
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_R2 = 0.5

@@ -10,8 +10,6 @@ import numpy.typing as npt
 from elevon.errors import FormatError
 from elevon.logs.formats.table import FloatArray
 
-__all__ = ["ClockQuality", "clipped_share", "clock_quality", "stuck_spans"]
-
 IntArray = npt.NDArray[np.intp]
 _GAP = 1.5  # an interval longer than this many periods is a gap
 _RUN = 5  # samples in a row at the extreme that make clipping

@@ -23,8 +23,6 @@ from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import ClockEstimate, SharedLogs, fit_clock
 from elevon.logs.clocks.offset_search import LEAST_R2, OffsetGuess, search_offset
 
-__all__ = ["ClockFit", "TriggerEdge", "align_clocks", "find_trigger"]
-
 FloatArray = npt.NDArray[np.float64]
 _MOST_DRIFT = 0.02  # an RC oscillator's worst: a fit beyond it is none of two clocks
 _SMOOTHING = 3.0  # periods of the slower log

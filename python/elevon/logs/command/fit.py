@@ -16,8 +16,6 @@ from elevon.logs.command.guess import FREE, guesses
 from elevon.logs.command.reconstruct import CommandTrace
 from elevon.waveforms import evaluate, wave_records
 
-__all__ = ["FREE", "WaveformFit", "best_waveform", "fit_waveform"]
-
 FloatArray = npt.NDArray[np.float64]
 
 _ANGLES = {"phase"}

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from elevon.waveforms import complete
 
-__all__ = ["FREE", "guesses"]
-
 FloatArray = npt.NDArray[np.float64]
 #: Parameters fitted for each waveform; the others keep their guess or the value given.
 FREE: dict[str, tuple[str, ...]] = {

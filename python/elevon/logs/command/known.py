@@ -13,8 +13,6 @@ from elevon.logs.command.note import CommandNote
 from elevon.logs.command.reconstruct import CommandTrace
 from elevon.scenario.evaluate import evaluate_terms
 
-__all__ = ["NotedCommand", "align_noted", "noted_values"]
-
 _MOST = 2000  # samples compared, and starts tried first
 _REFINED = 4  # searches, each five times finer than the one before
 

@@ -27,8 +27,6 @@ from elevon.scenario.scenario import Command, Scenario
 from elevon.units import ambiguous, is_ambiguous, parse_quantity, si_unit
 from elevon.waveforms import wave_records
 
-__all__ = ["CommandNote", "read_command_note"]
-
 _MOST_BYTES = 1_000_000
 _LARGEST = 1e300  # greater whole numbers are no floats; reading the value refuses them
 _MOST_TERMS = 1000

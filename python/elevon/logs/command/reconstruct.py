@@ -16,14 +16,6 @@ import numpy.typing as npt
 from elevon.errors import InputError, RangeError
 from elevon.recording import Recording
 
-__all__ = [
-    "POSITION_GAIN",
-    "SPEED_LIMIT",
-    "CommandTrace",
-    "reconstruct",
-    "reconstruct_from",
-]
-
 FloatArray = npt.NDArray[np.float64]
 POSITION_GAIN = 1000.0 / 60.0 * 124.0  # 1/s, output rad to motor-shaft rad/s
 SPEED_LIMIT = 500.0 * math.pi / 30.0  # rad/s

@@ -18,8 +18,6 @@ from elevon.logs.formats.text import read_text_table
 from elevon.logs.maps.column_map import shipped_map
 from elevon.recording import Recording
 
-__all__ = ["DATA_DOI", "PAPER_DOI", "read_cranfield"]
-
 DATA_DOI = "10.17862/cranfield.rd.5097649"
 PAPER_DOI = "10.1109/TIM.2018.2814067"
 

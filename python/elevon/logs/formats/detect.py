@@ -10,8 +10,6 @@ from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import head
 from elevon.logs.formats.table import RawTable
 
-__all__ = ["FORMATS", "file_kind", "read_table"]
-
 #: What `elevon import --format` takes.
 FORMATS = ("auto", "drive", "csv", "parquet", "netcdf", "mat", "recording", "cranfield")
 

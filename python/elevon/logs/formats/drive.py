@@ -16,9 +16,6 @@ from elevon.files import write_bytes
 from elevon.logs.maps.columns import drive_columns
 from elevon.units import to_display
 
-__all__ = ["DriveFormat", "write_drive_csv"]
-
-
 _STAND_INS = {"motor_position": "resolver_position", "resolver_speed": "motor_speed"}
 
 

@@ -13,8 +13,6 @@ from elevon.errors import quoted
 from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.table import FloatArray
 
-__all__ = ["numeric_vectors"]
-
 
 def numeric_vectors(
     path: Path, limits: Limits

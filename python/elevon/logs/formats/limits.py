@@ -7,8 +7,6 @@ from pathlib import Path
 
 from elevon.errors import FormatError, InputError, quoted
 
-__all__ = ["DEFAULT_LIMITS", "Limits", "existing_file"]
-
 
 @dataclass(frozen=True, slots=True)
 class Limits:

@@ -20,14 +20,6 @@ from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.text import read_text_table
 from elevon.units import check_kind, to_si
 
-__all__ = [
-    "LoadCellLog",
-    "brake_torque",
-    "guide_torque",
-    "read_loadcell",
-    "write_loadcell",
-]
-
 FloatArray = npt.NDArray[np.float64]
 _UNITS = {"N": "N", "Nm": "N m", "N m": "N m", "kg": "kg", "g": "g"}
 _GRAVITY = 9.80665

@@ -14,8 +14,6 @@ from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.formats.vectors import table_of_vectors
 
-__all__ = ["has_variable", "read_matlab"]
-
 
 def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
     """Read the numeric vectors of a .mat file, at the top or inside one plain structure.

@@ -14,8 +14,6 @@ from elevon.logs.formats.opening import head
 from elevon.logs.formats.table import FloatArray, RawTable
 from elevon.logs.formats.vectors import table_of_vectors
 
-__all__ = ["read_netcdf"]
-
 
 def read_netcdf(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
     """Read the numeric vectors of a NetCDF file, with their ``units`` attributes.

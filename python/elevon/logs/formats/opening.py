@@ -11,8 +11,6 @@ from typing import IO, cast
 
 from elevon.errors import FormatError, InputError
 
-__all__ = ["head", "open_bytes"]
-
 GZIP = b"\x1f\x8b"
 
 

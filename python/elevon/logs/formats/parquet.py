@@ -11,8 +11,6 @@ from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.table import RawTable, split_unit, unique_names
 from elevon.logs.formats.vectors import quiet
 
-__all__ = ["read_parquet"]
-
 
 def read_parquet(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
     """Read the numeric columns of a Parquet file; a missing value becomes NaN.

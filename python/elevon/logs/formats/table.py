@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from elevon.errors import FormatError, quoted
 
-__all__ = ["FloatArray", "RawTable", "split_unit", "unique_names"]
-
 _LARGEST = 1e100  # beyond it squares overflow; nothing measured comes near
 FloatArray = npt.NDArray[np.float64]
 

@@ -21,8 +21,6 @@ from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import open_bytes
 from elevon.logs.formats.table import RawTable, split_unit, unique_names
 
-__all__ = ["read_text_table"]
-
 _MISSING = {"", "nan"}
 _BYTES_PER_VALUE = 32
 _COMMENTS = 20

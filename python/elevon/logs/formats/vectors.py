@@ -10,8 +10,6 @@ from elevon.errors import FormatError, quoted
 from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.table import FloatArray, RawTable
 
-__all__ = ["quiet", "table_of_vectors"]
-
 _TIMES = ("xms", "time", "t", "time_s", "time_ms", "timems", "x")
 
 

@@ -17,8 +17,6 @@ from elevon.logs.maps.column_map import ColumnMap
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
-__all__ = ["check_agreement", "slope_and_fit"]
-
 #: What follows what: (role, reference, how the reference is turned into it).
 _PAIRS = (
     ("output_position", "output_speed", "integral"),

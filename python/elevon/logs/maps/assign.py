@@ -21,8 +21,6 @@ from elevon.logs.maps.signals import known_roles, known_signals, safe_name, unit
 from elevon.logs.report import ImportReport
 from elevon.units import parse_unit
 
-__all__ = ["Assignment", "assign_columns", "playing", "rms_to_peak", "settle_positions"]
-
 
 @dataclass(slots=True)
 class Assignment:

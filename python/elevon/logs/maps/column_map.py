@@ -14,8 +14,6 @@ from elevon.logs.formats.limits import existing_file
 from elevon.logs.maps.signals import known_roles, known_signals
 from elevon.recording.names import check_name
 
-__all__ = ["ColumnEntry", "ColumnMap", "find_map", "read_column_map", "shipped_map", "shipped_maps"]
-
 _MOST_BYTES = 1_000_000
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 

@@ -9,9 +9,6 @@ from elevon.errors import FormatError, did_you_mean, quoted
 from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.column_map import ColumnEntry, shipped_map
 
-__all__ = ["drive_columns", "find_drive_columns", "looks_like_drive", "parameter_key"]
-
-
 _PARAMETER = re.compile(r"(?:^|[^a-z])r0*(\d{2,4})(?:\[(\d)\]|\.\d+)?$")
 _TIME = {"xms", "x", "x[ms]", "time", "timems", "t", "tms", "zeit"}
 

@@ -15,15 +15,6 @@ import numpy as np
 
 from elevon.logs.formats.table import FloatArray
 
-__all__ = [
-    "Fit",
-    "UnitCandidate",
-    "encoder_candidates",
-    "match",
-    "motor_candidates",
-    "slope_with_backlash",
-]
-
 MOTOR_COUNTS = 2.0**24  # absolute encoder of the motor, counts a turn (test-bench thesis)
 ENCODER_COUNTS = 20_000.0  # 5000 pulses, four edges each, a turn of the encoder's own wheel
 ENCODER_WHEEL = 88.0 / 22.0  # turns of the encoder's wheel per turn of the output

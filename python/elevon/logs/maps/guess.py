@@ -21,8 +21,6 @@ from elevon.logs.maps.signals import known_roles
 from elevon.logs.maps.time_unit import TIME_UNITS, settle_time_unit
 from elevon.units import parse_unit
 
-__all__ = ["Guess", "GuessedColumn", "guess_map"]
-
 _EVEN = 0.25  # of the columns that rise, the one whose steps scatter least is the time
 _CURRENT = 0.2  # share of a column that acceleration, friction and speed must explain
 _DEFAULT_UNITS = {

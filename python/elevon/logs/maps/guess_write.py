@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 
-from elevon.logs.maps.guess import Guess, GuessedColumn
-
-__all__ = ["guess_text"]
+from elevon.logs.maps.guess import Guess
+from elevon.logs.maps.guess_column import GuessedColumn
 
 _HEAD = """# A first map of {source}: guessed, to be read and corrected.
 # Roles: `role`; what is wrong is refused at the import where the data contradict it.

@@ -10,8 +10,6 @@ from elevon.logs.maps.columns import drive_columns, parameter_key
 from elevon.logs.maps.signals import known_roles, known_signals
 from elevon.units import parse_unit
 
-__all__ = ["role_hint", "unit_hint"]
-
 _TIME = re.compile(r"^(x?ms|x|t|t_?ms|t_?s|zeit.*|.*time.*|.*timestamp.*|seconds?|sec)$")
 _WANTED = re.compile(r"demand|command|cmd|set_?p|setpoint|target|desired|ref|soll|_set$|_dem$|_sp$")
 _MOTOR = re.compile(r"motor|resolver|fast|rotor|_m$|^m_")

@@ -17,8 +17,6 @@ from elevon.logs.formats.table import FloatArray
 from elevon.logs.maps.agreement import slope_and_fit
 from elevon.units import parse_unit
 
-__all__ = ["ColumnFinding", "MotionColumns", "find_motion"]
-
 Candidates = Mapping[str, tuple[str, str, FloatArray]]
 _INTEGRAL = 0.9  # share of a position that the integral of its speed explains
 _FOLLOWS = 0.5  # share of a signal that its delayed set point explains

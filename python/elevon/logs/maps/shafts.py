@@ -20,8 +20,6 @@ from elevon.logs.maps.consistency import (
 )
 from elevon.logs.report import ImportReport
 
-__all__ = ["PositionStatement", "settle_encoder", "settle_motor", "travel_from_speed"]
-
 _LEAST_TRAVEL = 0.5  # rad of the motor: less than that says nothing about a unit
 
 

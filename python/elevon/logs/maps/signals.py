@@ -10,8 +10,6 @@ from functools import lru_cache
 from elevon.errors import InputError
 from elevon.units import parse_unit
 
-__all__ = ["LogSignal", "known_roles", "known_signals", "safe_name", "unit_among"]
-
 
 @dataclass(frozen=True, slots=True)
 class LogSignal:

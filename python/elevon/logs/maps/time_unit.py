@@ -12,8 +12,6 @@ from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint
 from elevon.units import Unit, parse_unit
 
-__all__ = ["TIME_UNITS", "settle_time_unit"]
-
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _COARSE = 0.05  # a step of so much is ms: logs are sampled at 20 Hz and faster
 _FAST = 20e3  # Hz: a faster log is rare, so that its unit is doubted

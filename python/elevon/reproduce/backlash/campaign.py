@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["BacklashResult", "RowResult", "no_load_scenario", "reproduce_backlash"]
-
 ACTUATOR = "torino-rotary"
 FREQUENCY = 0.2
 DURATION = 35.0

@@ -24,8 +24,6 @@ import numpy.typing as npt
 
 from elevon.errors import InputError
 
-__all__ = ["BacklashEstimate", "backlash_from_encoder", "flat_lengths", "lost_motion"]
-
 Array = npt.NDArray[np.float64]
 
 LEAD = 0.1

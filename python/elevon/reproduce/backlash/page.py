@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from elevon.reproduce.backlash.campaign import RowResult
 
-__all__ = ["backlash_report", "summary_figure"]
-
 DISPLAYED = (1, 7, 14)
 """Rows whose traces the paper shows."""
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from elevon.data import read_table
 
-__all__ = ["INTRINSIC_DEG", "BacklashRow", "centre_distance", "formula_deg", "measured_rows"]
-
 INTRINSIC_DEG = 0.365568
 """Backlash of the bench itself at zero spacing, total, at the output side (thesis) [deg]."""
 PRESSURE_ANGLE = math.radians(20.0)

@@ -21,8 +21,6 @@ from elevon.reproduce.compliance.fit import (
     loss_on_load,
 )
 
-__all__ = ["AngleColumns", "ComplianceResult", "reproduce_compliance"]
-
 GUIDE_RADIUS_M = 0.08
 """Radius of the winding guide (160 mm across), thesis Table 5.1 set-up."""
 NM_PER_RAD = 2.0 * GUIDE_RADIUS_M * 180.0 / math.pi

@@ -18,15 +18,6 @@ import numpy.typing as npt
 from elevon.errors import InputError
 from elevon.estimate.regression import huber
 
-__all__ = [
-    "ComplianceFit",
-    "bootstrap_interval",
-    "deming_stiffness",
-    "fit_compliance",
-    "load_on_loss",
-    "loss_on_load",
-]
-
 Array = npt.NDArray[np.float64]
 
 

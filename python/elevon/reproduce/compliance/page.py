@@ -19,8 +19,6 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["compliance_report"]
-
 
 def compliance_report(
     result: ComplianceResult, *, date: str | None = None, seed: int = 0

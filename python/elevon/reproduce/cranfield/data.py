@@ -14,8 +14,6 @@ from elevon.logs.formats.cranfield import DATA_DOI, read_cranfield
 from elevon.progress import Progress
 from elevon.recording import Recording
 
-__all__ = ["CONDITIONS", "FAMILIES", "CranfieldData", "family", "read_folder"]
-
 CONDITIONS = (
     "normal", "backlash1", "backlash2", "lackLubrication1", "lackLubrication2",
     *(f"spalling{stage}" for stage in range(1, 9)),

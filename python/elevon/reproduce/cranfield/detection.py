@@ -13,9 +13,6 @@ from elevon.diagnose.modelfree import TRANSFER, HealthyBaseline
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.reproduce.cranfield.data import CONDITIONS, CranfieldData
 
-__all__ = ["DETECTION", "FALSE_ALARM", "Detection", "detect"]
-
-
 DETECTION = (*TRANSFER, "current_assisted", "current_opposed")
 FALSE_ALARM = 0.05
 UNSEEN = tuple(f"spalling{stage}" for stage in range(1, 6))

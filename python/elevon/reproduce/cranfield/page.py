@@ -15,8 +15,6 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["cranfield_report"]
-
 _PROTOCOLS = (f"three classes: {STRICT}", f"four families: {GROUPED}", f"four families: {STRICT}",
           f"thirteen classes: {GROUPED}", f"thirteen classes: {STRICT}")  # fmt: skip
 

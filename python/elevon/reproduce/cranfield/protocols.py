@@ -13,8 +13,6 @@ from elevon.diagnose.modelfree import Discriminant
 from elevon.diagnose.modelfree.model import SHRINKAGE
 from elevon.reproduce.cranfield.data import CranfieldData
 
-__all__ = ["Answers", "chronological", "leave_load_out", "leave_run_out", "relative_to_healthy"]
-
 Groups = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 

@@ -37,8 +37,6 @@ from elevon.reproduce.cranfield.protocols import (
     relative_to_healthy,
 )
 
-__all__ = ["LIMITS", "THREE", "CranfieldResult", "Figure", "reproduce_cranfield"]
-
 Words = npt.NDArray[np.str_]
 Score = Callable[[npt.ArrayLike, npt.ArrayLike], float]
 DRAWS = 400

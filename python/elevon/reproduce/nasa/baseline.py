@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from elevon.recording import Recording
     from elevon.simulate import Run
 
-__all__ = ["baseline_matrix", "reproduce_baseline"]
-
 Array = npt.NDArray[np.float64]
 Case = tuple[MotionProfile, float]
 

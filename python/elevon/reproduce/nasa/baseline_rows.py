@@ -12,8 +12,6 @@ from elevon.reproduce.nasa.design import FactorEffect
 from elevon.reproduce.nasa.histories import HistoryFigure
 from elevon.reproduce.nasa.profiles import LoadKind, MotionProfile
 
-__all__ = ["MEASURES", "BaselineResult", "BaselineRow"]
-
 MEASURES = {
     "rms_current_a": ("RMS current", "A", 3),
     "peak_current_a": ("Peak current", "A", 2),

@@ -10,8 +10,6 @@ from elevon.errors import InputError, RangeError
 from elevon.parameters.relations import torque_constant
 from elevon.reproduce.nasa.profiles import MotionProfile
 
-__all__ = ["Capability"]
-
 
 @dataclass(frozen=True, slots=True)
 class Capability:

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["ACCELERATION", "corner_rows"]
-
 ACCELERATION = 1.0
 """m/s2 at a rounded corner (ASSUMED): 4 A of the 20 A there are."""
 DURATION = 8.0

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["PUBLISHED", "CurrentResult", "CurrentRow", "CurrentTrace", "reproduce_current"]
-
 ACTUATOR = "nasa-ballscrew"
 POUND_FORCE = float(to_si(1.0, "lbf"))
 PUBLISHED = {"nominal": (7.12, 9.96, 5.82), "jam": (8.34, 9.88, 5.60)}

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["DEMA", "DemaFit", "FitRow", "fit_dema"]
-
 Array = npt.NDArray[np.float64]
 
 DEMA = "nasa-dema"

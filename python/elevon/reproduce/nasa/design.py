@@ -14,15 +14,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = [
-    "FactorEffect",
-    "TwoLevelFactor",
-    "coverage",
-    "fit_effects",
-    "model_matrix",
-    "shuffled_blocks",
-]
-
 Array = npt.NDArray[np.float64]
 
 LEVEL = 0.95

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["POWER", "Effect", "EffectScale", "GroupComparison", "compare_profiles", "null_p"]
-
 Array = npt.NDArray[np.float64]
 
 POWER = 0.95

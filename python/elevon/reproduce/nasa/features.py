@@ -11,8 +11,6 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from elevon.recording import Recording
 
-__all__ = ["FEATURES", "ORDERS", "PEAK", "RECORD", "RMS", "UNITS", "compared", "features", "orders"]
-
 Array = npt.NDArray[np.float64]
 
 RECORD = "motor_position,motor_speed,current_ref,joint_force@2 kHz"

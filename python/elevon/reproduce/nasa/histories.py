@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.progress import Progress
 
-__all__ = ["HistoryFigure", "time_histories"]
-
 Array = npt.NDArray[np.float64]
 
 RECORD = (

@@ -16,8 +16,6 @@ from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["GAP", "Impact", "ImpactTrace", "gap_impacts", "gap_traces", "impact_checks"]
-
 Array = npt.NDArray[np.float64]
 Cells = Mapping[tuple[str, float], Mapping[str, Array]]
 

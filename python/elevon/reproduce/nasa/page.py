@@ -17,8 +17,6 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["nasa_report"]
-
 Result = BaselineResult | SeparationResult | ThermalResult
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["baseline_page"]
-
 
 def baseline_page(result: BaselineResult, date: str | None) -> Report:
     """Return the report, without its checks and its provenance."""

@@ -7,8 +7,6 @@ from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.current import PUBLISHED, CurrentResult
 from elevon.reproduce.provenance import provenance
 
-__all__ = ["current_report"]
-
 
 def current_report(result: CurrentResult, *, date: str | None = None) -> Report:
     """Return the report of `elevon reproduce nasa-current`."""

@@ -16,8 +16,6 @@ import numpy as np
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
 
-__all__ = ["NOISE", "SPREADS", "UnitSpread", "draw_units", "spread_rows"]
-
 Kind = Literal["factor", "added", "vector", "range"]
 
 

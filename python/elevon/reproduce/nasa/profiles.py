@@ -8,8 +8,6 @@ from typing import Any, Literal
 
 from elevon.errors import InputError, unknown
 
-__all__ = ["LOAD_KINDS", "PROFILES", "LoadKind", "MotionProfile", "profile_scenario"]
-
 LoadKind = Literal["constant", "step", "spring"]
 LOAD_KINDS: tuple[LoadKind, ...] = ("constant", "step", "spring")
 

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.simulate import Run
 
-__all__ = ["FAULTS", "Seeded", "SeparationResult", "SeparationRow", "reproduce_separation"]
 
 Array = npt.NDArray[np.float64]
 

@@ -9,8 +9,6 @@ from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.effect import Effect
 from elevon.reproduce.nasa.impact import Impact, ImpactTrace
 
-__all__ = ["Seeded", "SeparationResult", "SeparationRow"]
-
 
 @dataclass(frozen=True, slots=True)
 class Seeded:

@@ -13,8 +13,6 @@ import numpy.typing as npt
 from elevon.errors import OutputExistsError
 from elevon.files import write_text
 
-__all__ = ["CellStore", "work_key"]
-
 Array = npt.NDArray[np.float64]
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from elevon.progress import Progress
     from elevon.recording import Recording
 
-__all__ = ["ThermalResult", "closed_form", "reproduce_thermal", "steady_state"]
-
 Array = npt.NDArray[np.float64]
 
 ACTUATOR = "nasa-ballscrew"
