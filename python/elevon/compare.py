@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import InputError, RangeError, SimulationError
 from elevon.plain import STORED, in_unit, key
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.results import Result
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.recording import Recording
-    from elevon.scenario import Scenario
+from elevon.scenario import Scenario
 
 Array = npt.NDArray[np.float64]
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, default_scenario, default_start
 from elevon.errors import InputError, SimulationError
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.scenario import Scenario
+from elevon.progress import Progress
+from elevon.scenario import Scenario
 
 LOADS = {"as given": 0.0, "opposing": 1.0, "aiding": -1.0}
 """Name of each run and the sign of its load along the motion."""

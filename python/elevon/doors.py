@@ -5,21 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from elevon.simulate.arguments import as_actuator, as_scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.analysis.effects import Effects
-    from elevon.bench.procedure import Procedure
-    from elevon.bench.run import BenchResult
-    from elevon.compare import Comparison
-    from elevon.faults import Fault
-    from elevon.logs.formats.drive import DriveFormat
-    from elevon.progress import Progress
-    from elevon.response import FrequencyResponse, LoopResponse
-    from elevon.simulate.arguments import ActuatorLike, ScenarioLike
+from elevon.actuator import Actuator
+from elevon.analysis.effects import Effects
+from elevon.bench.procedure import Procedure
+from elevon.bench.run import BenchResult
+from elevon.compare import Comparison
+from elevon.faults import Fault
+from elevon.logs.formats.drive import DriveFormat
+from elevon.progress import Progress
+from elevon.response import FrequencyResponse, LoopResponse
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 
 
 def bench(

@@ -9,14 +9,12 @@ import os
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
-
-if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
 
 LONGEST = 256 * 2**20
 """Bytes of a table of points: some ten million rows."""

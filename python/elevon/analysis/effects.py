@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +13,8 @@ from elevon.analysis.terms import TermColumn, blocks_matrix, further_contrasts, 
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.plain import STORED, Plain
+from elevon.report import Report
 from elevon.results import Result
-
-if TYPE_CHECKING:
-    from elevon.report import Report
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.analysis.response import CampaignResponse, VariedFactor, read_response
 from elevon.arrays import Floats
+from elevon.campaign import Dataset
 from elevon.errors import InputError
-
-if TYPE_CHECKING:
-    from elevon.campaign import Dataset
 
 
 @dataclass(frozen=True)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.campaign import Dataset
 from elevon.errors import InputError, unknown
-
-if TYPE_CHECKING:
-    from elevon.campaign import Dataset
 
 Ints = npt.NDArray[np.int64]
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.bench.stand import ChannelSpec, Stand
 from elevon.errors import InputError
+from elevon.recording import Recording
 from elevon.units import parse_quantity
-
-if TYPE_CHECKING:
-    from elevon.bench.stand import ChannelSpec, Stand
-    from elevon.recording import Recording
 
 LOAD_CHANNEL = "rig_force"
 """Channel of the role ``load``: force of the stand on the rod, positive opposes positive motion."""

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.bench.procedure import ForceStep
+from elevon.bench.stand import ForceSpec
 from elevon.errors import InputError
 from elevon.units import parse_quantity
-
-if TYPE_CHECKING:
-    from elevon.bench.procedure import ForceStep
-    from elevon.bench.stand import ForceSpec
 
 _AT_REST = 1e-3  # m/s below which a direction fades: rest has none
 

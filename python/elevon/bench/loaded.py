@@ -5,28 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop, target_force
 from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
 from elevon.bench.rig import Conditions, draw_conditions, moved
+from elevon.bench.stand import Stand
 from elevon.errors import DivergedError, InputError
+from elevon.faults import Fault
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.recording.formats import files_of
+from elevon.scenario import Scenario
+from elevon.scenario.scenario import Term
 from elevon.simulate import Run, simulate, simulate_batch, solver_step
 from elevon.units import parse_quantity
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.bench.stand import Stand
-    from elevon.faults import Fault
-    from elevon.progress import Progress
-    from elevon.recording import Recording
-    from elevon.scenario import Scenario
-    from elevon.scenario.scenario import Term
 
 _GRID = 1e-3  # s of the force table
 _FINE = 0.25  # of it between two samples of the motion

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.bench.brake_rig import BrakeRig, BrakeRun, CellState, brake_loop
 from elevon.bench.load_module import Springs, Weights, springs_of, weights_of
 from elevon.bench.procedure import (
@@ -23,13 +24,10 @@ from elevon.bench.procedure import (
     WeightsStep,
 )
 from elevon.errors import InputError
+from elevon.faults import Fault
 from elevon.scenario import Scenario
 from elevon.scenario.scenario import Term
 from elevon.units import parse_quantity
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.faults import Fault
 
 RATE = 400.0  # Hz of the drive's trace (T1)
 _LONGEST_WAIT = 1.0  # s from the trace's start to the trigger, and from there to the command

@@ -8,26 +8,24 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from elevon.actuator import Actuator
 from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_loaded
+from elevon.bench.procedure import Procedure
 from elevon.bench.rig import Setup, setups
 from elevon.bench.stand import stand_of
 from elevon.bench.state import BenchState
 from elevon.bench.traces import recorded, write_traces
 from elevon.errors import InputError, Interrupted
+from elevon.faults import Fault
 from elevon.files import check_output, write_text
 from elevon.logs.formats.drive import DriveFormat
 from elevon.plain import WORKING, Plain, in_unit
 from elevon.progress import Progress, part
+from elevon.recording import Recording
 from elevon.results import Result
 from elevon.worklog import locked, sweep
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.bench.procedure import Procedure
-    from elevon.faults import Fault
-    from elevon.recording import Recording
 
 
 @dataclass(frozen=True)

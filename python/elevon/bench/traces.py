@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +17,8 @@ from elevon.logs.command.guess import FREE
 from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import write_loadcell
 from elevon.parameters.records import wirings
+from elevon.recording import Recording
 from elevon.units import parse_quantity
-
-if TYPE_CHECKING:
-    from elevon.recording import Recording
 
 _LOGGED = {
     "encoder_position": "encoder_position",

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.bench.procedure import BacklashStep, Procedure, TraceStep
+from elevon.bench.rig import Setup
 from elevon.bench.traces import cell_signals, drive_signals
-
-if TYPE_CHECKING:
-    from elevon.bench.rig import Setup
-    from elevon.logs.command.note import CommandNote
-    from elevon.logs.log import Log
-    from elevon.recording import Recording
+from elevon.logs.command.note import CommandNote
+from elevon.logs.log import Log
+from elevon.recording import Recording
 
 
 def first_trace(procedure: Procedure) -> Procedure:

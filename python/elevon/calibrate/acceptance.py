@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.candidates import within_inertia
 from elevon.calibrate.dynamic import Dynamic
 from elevon.calibrate.plant import Torque
@@ -15,9 +15,6 @@ from elevon.errors import InputError
 from elevon.estimate import Estimate
 from elevon.parameters.records import record_of
 from elevon.parameters.relations import static_following
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: Offsets of sensors, which no parameter holds: they go with the actuator file's promises on logs.
 _OFFSETS = {

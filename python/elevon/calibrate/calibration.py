@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.calibrate.acceptance import shortened, undetermined, with_values
 from elevon.calibrate.backlashes import PER_LOG
 from elevon.calibrate.direct import saturated_speed
@@ -24,9 +24,6 @@ from elevon.logs.log import Log
 from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
 from elevon.threads import one_blas_thread
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Bools = npt.NDArray[np.bool_]
 _RUN_IN = 1.0  # s at least before a log counts

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.direct import DirectEstimate, direct_estimate
 from elevon.errors import InputError
 from elevon.estimate import Free
 from elevon.logs.log import Log
 from elevon.parameters.records import record_of
 from elevon.parameters.relations import emf_constant, motor_torque_constant, static_following
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: What `auto` tries to free in the dynamic fit, in the model's own parameters.
 AUTO = (

@@ -10,19 +10,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from elevon.calibrate.drops import is_drop_table, run_drops
+from elevon.calibrate.outcome import Calibration
+from elevon.calibrate.validation import Validation
 from elevon.calibrate.ways import CalibrationRequest, way_of
-from elevon.logs.read import as_logs
-from elevon.simulate.arguments import as_actuator
-
-if TYPE_CHECKING:
-    from elevon.calibrate.outcome import Calibration
-    from elevon.calibrate.validation import Validation
-    from elevon.logs.read import LogsLike
-    from elevon.progress import Progress
-    from elevon.simulate.arguments import ActuatorLike
+from elevon.logs.read import LogsLike, as_logs
+from elevon.progress import Progress
+from elevon.simulate.arguments import ActuatorLike, as_actuator
 
 
 def calibrate(

@@ -5,15 +5,12 @@ from __future__ import annotations
 import csv
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
+from elevon.calibrate.outcome import Calibration
+from elevon.calibrate.slips import WeightDrop
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.calibrate.outcome import Calibration
-    from elevon.calibrate.slips import WeightDrop
 
 COLUMNS = ("load_n", "motor_deg", "encoder_deg", "loss_deg")
 _MOST_BYTES = 10_000_000

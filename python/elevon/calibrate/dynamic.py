@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.candidates import candidates, start_values, within_inertia
 from elevon.calibrate.identify import Identifiability, SensitivityTable, choose
@@ -22,9 +22,6 @@ from elevon.estimate.lanes import Lanes
 from elevon.logs.log import Log
 from elevon.parameters.relations import constant_is_tied, static_following
 from elevon.progress import Progress
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Bools = npt.NDArray[np.bool_]
 _ABSORBS = 0.02  # relative difference to the direct estimate that is worth a name

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.dynamic import Dynamic
 from elevon.calibrate.kinematics import CommandFit
 from elevon.calibrate.plant import Torque
@@ -13,9 +13,6 @@ from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression
 from elevon.logs.log import Log
 from elevon.parameters.relations import motor_torque_constant
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _CONVENTION = 0.05  # relative: how near a factor must be to sqrt 2 to be named
 _FACTOR = 0.002  # relative: a smaller amplitude factor is not worth a word

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.calibrate.balance import torque_balance
 from elevon.calibrate.law import controller_law
 from elevon.calibrate.plant import controller_estimates, plant_estimates, torque_scale
@@ -19,9 +20,6 @@ from elevon.logs.log import Log
 from elevon.parameters.relations import static_following
 from elevon.plain import Plain, in_unit, key
 from elevon.progress import Progress
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Bools = npt.NDArray[np.bool_]
 _OFFSETS = ("sensor.current_offset",)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.estimate import Estimate
 from elevon.parameters.records import record_of, records
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 
 def named(

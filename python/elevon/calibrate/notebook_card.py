@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
+from elevon.estimate import Estimate
 from elevon.number_text import estimate_row
 from elevon.report.cards import Html, badge, card, table
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.estimate import Estimate
 
 
 def calibration_card(

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
+from elevon.calibrate.validation import Validation
 from elevon.errors import InputError
 from elevon.progress import Progress, part
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.calibrate.validation import Validation
 
 
 def held_out_logs(

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.named import named
+from elevon.calibrate.static import StaticFriction
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression
 from elevon.parameters.relations import constant_is_tied, emf_constant, motor_torque_constant
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.calibrate.static import StaticFriction
 
 _TIED = 0.01  # relative: closer than this the controller is taken to know the motor
 _SEEN = 3.0  # deviations from zero of a controller branch that exists

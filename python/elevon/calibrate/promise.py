@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.validation import Validation, validate
 from elevon.estimate.held_out import held_out
 from elevon.logs.log import Log
 from elevon.progress import Progress
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 
 def held_out_agreement(

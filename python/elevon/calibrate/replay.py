@@ -7,21 +7,17 @@ model has is compared, role by role.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.validation import Validation, ValidationTrace
 from elevon.errors import InputError, SimulationError, unknown
 from elevon.experiment import Experiment, Inputs, ModelRun
 from elevon.logs.log import Log, on_clock
-from elevon.progress import part
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.recording import Recording
+from elevon.progress import Progress, part
+from elevon.recording import Recording
 
 _INPUTS = ("command", "load")
 _SMOOTH = 0.5  # s over which the ram's imposed speed is taken from its position

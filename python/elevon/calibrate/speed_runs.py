@@ -8,19 +8,16 @@ torque current that the model's speed controller, drive, motor and friction make
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.model_runs import ModelRuns
 from elevon.experiment import Experiment, Inputs, Sensor, Variant
 from elevon.experiment.inputs import Table
 from elevon.logs.log import Log
 from elevon.parameters.relations import torque_constant
 from elevon.simulate.prepare import solver_step
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _STEP = 1e-4  # s: the reduced-order model's own 0.25 ms costs half a per cent of damping
 _SIGNALS = {"torque_current": "current_q_meas", "current_ref": "current_ref"}

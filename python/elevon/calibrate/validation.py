@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.kinematics import command_fit
 from elevon.errors import InputError, Interrupted, unknown
@@ -19,11 +20,8 @@ from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.plain import STORED, Plain, in_unit, key
 from elevon.progress import Progress
+from elevon.report import Report
 from elevon.results import Result
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.report import Report
 
 Bools = npt.NDArray[np.bool_]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from elevon.actuator import Actuator
 from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.stages.choice import balanced, preloaded
 from elevon.calibrate.validation import Validation
@@ -14,10 +15,7 @@ from elevon.errors import ElevonError, InputError
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.progress import Progress, part
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.recording import Recording
+from elevon.recording import Recording
 
 _LONG = 120.0  # s: a log of temperatures is no log of a motion to be predicted
 _NOT_COMPARED = "a log lacks a position: the closed loop is not compared"

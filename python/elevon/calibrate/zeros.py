@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.backlash import BacklashFit, fit_backlash
 from elevon.calibrate.backlashes import backlashes_differ, differing_backlashes, pooled_backlash
 from elevon.calibrate.kinematics import CommandFit, speed_limit, speed_sensor
 from elevon.calibrate.named import named
 from elevon.estimate import Estimate, quantile
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _OTHER = 0.005  # relative: a limit nearer the actuator file's than this is the actuator file's
 _ROUNDED = 0.1  # counts: what rounding to counts may shift where every stroke turns alike

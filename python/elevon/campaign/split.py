@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.campaign.resolved import Resolved
 from elevon.errors import InputError
-
-if TYPE_CHECKING:
-    from elevon.campaign.resolved import Resolved
 
 Groups = npt.NDArray[np.int64]
 

@@ -11,13 +11,11 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
+from elevon.actuator import Actuator
 from elevon.errors import FormatError, OutputExistsError
 from elevon.worklog import WorkLog, digest
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Result = TypeVar("Result")
 LOG = "unfinished.log"

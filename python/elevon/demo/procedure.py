@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from elevon.bench.procedure import Procedure
+from elevon.bench.procedure import Procedure
 
 HELD_OUT = "held-out"
 """Name of the log that is kept from the calibration."""

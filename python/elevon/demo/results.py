@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elevon.report.checks import Check
+from elevon.reproduce.backlash import BacklashResult
 from elevon.reproduce.backlash.campaign import RowResult
 from elevon.reproduce.backlash.table import BacklashRow
-
-if TYPE_CHECKING:
-    from elevon.reproduce.backlash import BacklashResult
 
 
 @dataclass(frozen=True)

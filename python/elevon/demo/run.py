@@ -6,23 +6,21 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from elevon.actuator import Actuator
+from elevon.calibrate import Validation
 from elevon.calibrate.outcome import Calibration
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
 from elevon.demo.results import Backlashes
 from elevon.demo.steps import Story, Work
+from elevon.logs.importing import ImportedLog
+from elevon.logs.log import Log
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, verdict
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.calibrate import Validation
-    from elevon.logs.importing import ImportedLog
-    from elevon.logs.log import Log
 
 _PAGES = ("report.html", "backlash.html", "calibrated.toml", "truth.json")
 

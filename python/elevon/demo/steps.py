@@ -6,13 +6,11 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from elevon.actuator import Actuator
 from elevon.demo.finished import FinishedSteps
 from elevon.demo.results import Step
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Result = TypeVar("Result")
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted
 from elevon.experiment.inputs import Inputs, Table, checked
@@ -20,9 +21,6 @@ from elevon.scenario.compile import signal_records
 from elevon.simulate.acting import report
 from elevon.simulate.batch import simulate_prepared
 from elevon.simulate.prepare import Prepared, Run, prepare
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _CHUNK = 64  # runs held at once
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from elevon.arrays import Floats
-
-if TYPE_CHECKING:
-    from elevon.logs.command.note import CommandNote
-    from elevon.recording import Recording
+from elevon.logs.command.note import CommandNote
+from elevon.recording import Recording
 
 Known = Literal["torque", "force", "on", "off"]
 _MOVING = 0.1  # of the highest speed: slower than that a resistive torque is not at its level

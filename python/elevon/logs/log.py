@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,9 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.errors import InputError, did_you_mean
 from elevon.logs.brake import Brake, brake_of
-
-if TYPE_CHECKING:
-    from elevon.logs.command.note import CommandNote
-    from elevon.recording import Recording
-    from elevon.recording.channel import Channel
+from elevon.logs.command.note import CommandNote
+from elevon.recording import Recording
+from elevon.recording.channel import Channel
 
 Bools = npt.NDArray[np.bool_]
 Value = TypeVar("Value")

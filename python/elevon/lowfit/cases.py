@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.errors import InputError
 from elevon.faults import Fault
 from elevon.scenario import Scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 ROTARY_FAULTS = (
     "short@motor.phase_a=0.1",

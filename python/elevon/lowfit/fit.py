@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, filtered
 from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
+from elevon.lowfit.cases import FitCase
 from elevon.parameters.records import records
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.lowfit.cases import FitCase
-    from elevon.progress import Progress
-    from elevon.recording import Recording
+from elevon.progress import Progress
+from elevon.recording import Recording
 
 Array = npt.NDArray[np.float64]
 

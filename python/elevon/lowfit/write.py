@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from elevon.lowfit.fit import LowFit
 from elevon.parameters import Parameter
 from elevon.parameters.find import find_set
 from elevon.parameters.write import write_set
-
-if TYPE_CHECKING:
-    from elevon.lowfit.fit import LowFit
 
 
 def fitted_parameters(fit: LowFit) -> list[Parameter]:

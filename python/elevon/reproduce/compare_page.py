@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from elevon.compare import Comparison
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.provenance import provenance
-
-if TYPE_CHECKING:
-    from elevon.compare import Comparison
 
 
 def compare_report(comparison: Comparison, actuator: str, *, date: str | None = None) -> Report:

@@ -11,20 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.compare import RATES, filtered
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault, find_record
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.recording import Recording
-    from elevon.scenario import Scenario
+from elevon.progress import Progress
+from elevon.recording import Recording
+from elevon.scenario import Scenario
 
 Array = npt.NDArray[np.float64]
 

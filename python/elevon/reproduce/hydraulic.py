@@ -9,17 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elevon.plain import Plain
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import Stroke, run_strokes
-
-if TYPE_CHECKING:
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 TEMPERATURES = (-40.0, 20.0, 70.0)
 FACTORS = (0.0, 1.0, 1.5, 3.5)

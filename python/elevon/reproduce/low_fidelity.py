@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, default_scenario, filtered
+from elevon.progress import Progress
 from elevon.report import Check, verdict
 from elevon.scenario import Scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
 
 POSITION_LIMIT = 0.005
 CURRENT_LIMIT = 0.05

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from elevon.lowfit import LowFit
 from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
-
-if TYPE_CHECKING:
-    from elevon.lowfit import LowFit
 
 
 def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Report:

@@ -8,21 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import SimulationError
+from elevon.faults.catalogue import FaultRecord
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.recording.states import code_names
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.faults.catalogue import FaultRecord
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 RECORD = (
     "state,fault_code,warning_code,locked,output_position,output_speed,nut_position,"

@@ -10,20 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import SimulationError
 from elevon.plain import Plain
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, Stroke, run_strokes
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 GRAVITY = 9.80665
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)

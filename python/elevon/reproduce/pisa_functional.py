@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import CONDITIONS, Condition, Stroke, run_strokes, stroke_time
-
-if TYPE_CHECKING:
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 
 @dataclass(frozen=True, slots=True)

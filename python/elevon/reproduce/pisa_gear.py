@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elevon.errors import SimulationError
-
-if TYPE_CHECKING:
-    from elevon.progress import Progress
-    from elevon.recording import Recording
+from elevon.progress import Progress
+from elevon.recording import Recording
 
 ACTUATOR = "pisa-landing-gear"
 COMMANDED = 0.1

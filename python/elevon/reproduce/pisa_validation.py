@@ -7,18 +7,16 @@ and more friction, another EMF constant, its own load control and sensors.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
+from elevon.calibrate.validation import Validation, ValidationTrace
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, CONDITIONS, Condition
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.calibrate.validation import Validation, ValidationTrace
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 SECONDS = {"extend": 14.0, "retract": 16.0}
 DISPLAYED = ("output_position", "motor_speed", "torque_current")

@@ -5,18 +5,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
+from elevon.progress import Progress
 from elevon.report.checks import Check, verdict
 from elevon.safety.hazards import HAZARDS, RECORD, observe
 from elevon.safety.rates import rate
 from elevon.safety.reasons import reason
 from elevon.safety.rows import Row, population, triples
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
 
 WIRING = "landing_gear"
 CHUNK = 256

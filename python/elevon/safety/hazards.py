@@ -7,15 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
-
-if TYPE_CHECKING:
-    from elevon.recording import Recording
-    from elevon.safety.rows import Row
+from elevon.recording import Recording
+from elevon.safety.rows import Row
 
 RECORD = (
     "state,fault_code,warning_code,command_refused,locked,released,output_position,nut_position,"

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
+from elevon.recording import Recording
 from elevon.recording.states import code_names
 from elevon.report import Report, ReportTable
 from elevon.report.figures import new_figure
 from elevon.reproduce.provenance import provenance
+from elevon.safety.campaign import HazardRow, SafetyResult
 from elevon.safety.hazards import HAZARDS, RECORD
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.recording import Recording
-    from elevon.safety.campaign import HazardRow, SafetyResult
 
 
 def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None = None) -> Report:

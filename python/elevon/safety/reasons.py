@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from elevon.safety.rows import Row
+from elevon.safety.rows import Row
 
 _LOCK_SWITCH = "proximity_on@sensor.proximity_100"
 _ORDER = {"proximity_on@sensor.proximity_75", "proximity_on@sensor.proximity_25"}

@@ -6,10 +6,9 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from elevon.scenario import Scenario
+from elevon.scenario import Scenario
 
 Steps = tuple[tuple[float, str], ...]
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.recording import Recording
 from elevon.recording.states import code_names
-
-if TYPE_CHECKING:
-    from elevon.recording import Recording
 
 _CODES = ("command", "command_refused", "state", "fault_code", "warning_code")
 

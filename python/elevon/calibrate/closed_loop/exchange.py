@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.fit import DECIDED, Fitted
 from elevon.estimate.free import outer
 from elevon.estimate.lanes import Lanes, Point
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 GAIN, TIME = "control.position_gain", "control.integral_time"
 _ROUNDS = 8  # of the fit with the gains exchanged

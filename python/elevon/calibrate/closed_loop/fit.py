@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.closed_loop.free import asked_for, free_list
 from elevon.calibrate.closed_loop.model import LoopModel
@@ -18,9 +18,6 @@ from elevon.estimate.free import inner, outer
 from elevon.estimate.held_out import folds
 from elevon.estimate.lanes import Lanes
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Check = Callable[[], bool]
 _STARTS = 32

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.closed_loop.log import NAMES, recorded_roles, sigma, unsigned
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.errors import unknown
 from elevon.estimate import Free
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 STRUCTURES = ("cascade", "pid")
 _LATEST = 2e-2  # s, lag of a current loop

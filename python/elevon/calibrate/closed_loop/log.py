@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.log import Log, bridged, per_log
-
-if TYPE_CHECKING:
-    from elevon.recording import Recording
+from elevon.recording import Recording
 
 #: What a log may show, by role, and what the logger's delays and offsets are named by.
 NAMES: dict[str, str] = {

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.closed_loop.free import STICK
 from elevon.calibrate.closed_loop.log import NAMES, demand, motion, unsigned
 from elevon.calibrate.model_runs import ModelRuns
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.experiment import Experiment, Inputs, Sensor, Variant
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: Role to the model's signal, the sensors' own; and first deviations, as shares of a channel's
 #: spread: what a fair model of an unknown drive leaves.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.closed_loop.fit import Fitted, parts_apart, refitted
 from elevon.calibrate.closed_loop.free import STICK, in_set
 from elevon.calibrate.closed_loop.log import NAMES
@@ -13,9 +13,6 @@ from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.errors import InputError, unknown
 from elevon.estimate.free import outer
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _UNITS = {"position": "m", "speed": "m/s", "motor_position": "rad", "motor_speed": "rad/s",
           "current": "A", "voltage": "V"}  # fmt: skip

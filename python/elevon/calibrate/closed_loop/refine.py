@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.closed_loop.fit import Searched
 from elevon.calibrate.closed_loop.free import LOAD_SHARE, free_list
 from elevon.calibrate.closed_loop.log import motion
@@ -21,9 +21,6 @@ from elevon.calibrate.closed_loop.start import windows
 from elevon.estimate.free import inner, outer
 from elevon.estimate.lanes import Point
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
 #: 100 Hz settles it; half and twice as much are part of the intervals.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.closed_loop.exchange import exchanged
 from elevon.calibrate.closed_loop.fit import (
     Fitted,
@@ -30,9 +30,6 @@ from elevon.logs.log import Log
 from elevon.parameters.relations import static_following
 from elevon.progress import Progress
 from elevon.threads import one_blas_thread
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: What scales with the torque constant that the current is read by.
 _SCALED = {

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.moves import Move, moves_of
@@ -22,9 +22,6 @@ from elevon.calibrate.stages.third_phase import ThirdPhase
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _START = 0.1  # s after the drive begins ...
 _END = 0.06  # ... and before it ends

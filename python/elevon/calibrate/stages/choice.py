@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.stages.log import MOTION
 from elevon.calibrate.stages.smooth import LOAD
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.logs.log import Log
+from elevon.logs.log import Log
 
 
 def preloaded(actuator: Actuator) -> bool:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from elevon.actuator import Actuator
 from elevon.calibrate.named import named
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.errors import InputError, Interrupted
@@ -14,9 +15,6 @@ from elevon.estimate import Estimate
 from elevon.logs.log import Log
 from elevon.parameters.records import record_of, records
 from elevon.progress import Progress, part
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 C = TypeVar("C", bound="Context")
 _WIDE = 0.2  # of a value: a deviation above which it is not determined

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.block_drive import Motor, driving, motor_constants
 from elevon.calibrate.stages.context import Context
@@ -20,9 +20,6 @@ from elevon.calibrate.stages.train import Constants, TrainBalance, torque_balanc
 from elevon.estimate import Estimate
 from elevon.estimate.number import as_values
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _ROUNDS = 3  # of runs that correct the balances, at most
 _NOISES = 4  # draws of a run's noise, over which its readings are averaged

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from elevon.actuator import Actuator
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
 from elevon.calibrate.stages import lock, loops, motor, rig, screw
 from elevon.calibrate.stages.context import Context, Stage, run_stages
@@ -18,9 +18,6 @@ from elevon.logs.log import Log
 from elevon.parameters.records import record_of, records
 from elevon.progress import Progress
 from elevon.threads import one_blas_thread
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _FIDELITIES = ("auto", "low", "high")
 _UNIT = "control.gain_extension"  # an actuator with a control unit of its own has it

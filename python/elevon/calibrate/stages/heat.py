@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.screw import nut_force, nut_loss
@@ -20,9 +20,6 @@ from elevon.calibrate.stages.smooth import loaded
 from elevon.estimate import Determined, Estimate, Free
 from elevon.estimate.residual import BalanceFit, fit_balance
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _COPPER = 0.05  # of a resistance from a datasheet
 _BIN = 2.0  # s over which channels are averaged

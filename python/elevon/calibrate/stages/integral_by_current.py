@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.block_drive import Motor
 from elevon.calibrate.stages.moves import Move, moves_of
@@ -26,9 +26,6 @@ from elevon.estimate import Determined, Estimate
 from elevon.estimate.regression import with_deviations
 from elevon.estimate.residual import fit_residual
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: Roles that this way needs.
 NEEDS = ("torque_current", "motor_speed", "output_position")

@@ -6,11 +6,11 @@ The nut's place beyond the stroke is counted from the motor; the ram shows it un
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.log import motor_ratio
@@ -19,9 +19,6 @@ from elevon.calibrate.stages.rig_tables import GRAVITY, KNOTS, hats, knots
 from elevon.calibrate.stages.rig_tests import RigTest, rig_tests
 from elevon.estimate import Estimate
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _BEFORE = (0.02, 1.0)  # s between nut and ram, over which both are held together
 _DELAYS = ("brake.release_delay", "brake.engage_delay")

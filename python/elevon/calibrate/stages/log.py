@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.recording import Recording
+from elevon.recording import Recording
 
 _FEWEST = 100  # samples
 #: What shows the motor's speed, the best first.

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.log import motor_ratio
@@ -23,9 +23,6 @@ from elevon.calibrate.stages.smooth import quick, slope, smoothed
 from elevon.estimate import Determined, Estimate
 from elevon.estimate.regression import Regression, regressed
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 PATHS = ("control.speed_gain", "control.position_gain", "control.integral_time")
 #: What they stand on.

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.smooth import CORNERS, apart, quick, smooth
 from elevon.estimate.regression import Regression, regressed
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _RATE = 5e-4  # relative: what rates and clocks of a stand leave open
 _WARMTH = 1.0  # K of the winding over the surface that no log of seconds shows

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.rig_tests import HARMONICS, RigTest
 from elevon.estimate import Estimate
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 KNOTS = 8
 GRAVITY = 9.80665

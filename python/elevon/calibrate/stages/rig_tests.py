@@ -9,19 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.moves import connected, rig_moves
 from elevon.estimate.covariance import block_covariance
 from elevon.estimate.regression import huber
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 HARMONICS = 5
 _SETTLED = 0.3  # s left out: the rig's start

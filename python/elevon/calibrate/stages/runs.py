@@ -10,19 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.replay import as_recorded, replayed, unit_experiment
 from elevon.calibrate.stages.moves import moves_of
 from elevon.errors import ElevonError
 from elevon.estimate import Estimate
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
+from elevon.progress import Progress
 
 _RATE = 25e3  # Hz at least of a run's channels, before the recorder's filter
 _SHARE = 0.1  # of a correction, as its deviation: ASSUMED, the model is not the machine

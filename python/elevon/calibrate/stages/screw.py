@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.motor import flux_factor
@@ -22,9 +22,6 @@ from elevon.estimate import Estimate, Free
 from elevon.estimate.covariance import Strokes
 from elevon.estimate.residual import BalanceFit, fit_balance
 from elevon.logs.log import Log
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 #: What is believed before the logs, as a share of the actuator file's value.
 _BELIEF = {

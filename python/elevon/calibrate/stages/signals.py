@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.calibrate.acceptance import accept, missing
 from elevon.calibrate.balance import torque_balance
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
@@ -28,9 +28,6 @@ from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression
 from elevon.logs.log import Log
 from elevon.progress import Progress, part
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
 _ENCODER = "sensor.encoder.wheel_ratio"  # an actuator with an encoder on its output shaft has it

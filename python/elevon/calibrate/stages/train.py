@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.block_drive import Driving, Motor
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.rig_tables import KNOTS, hats, knots
 from elevon.estimate import Estimate, Free
 from elevon.estimate.residual import BalanceFit, fit_balance
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 _INERTIA, _UNLOADED, _LOADED = (
     "motor.inertia", "screw.efficiency_unloaded", "screw.efficiency_loaded",

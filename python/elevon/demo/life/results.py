@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from elevon.calibrate.outcome import Calibration
 from elevon.demo.steps import Story
+from elevon.diagnose.engine import Diagnosis
+from elevon.prognose import Inspection, Prognosis, ResponseTables
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
 from elevon.report.checks import Check, verdict
-
-if TYPE_CHECKING:
-    from elevon.diagnose.engine import Diagnosis
-    from elevon.prognose import Inspection, Prognosis, ResponseTables
 
 
 @dataclass(frozen=True)

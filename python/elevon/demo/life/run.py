@@ -6,7 +6,7 @@ import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,13 +28,11 @@ from elevon.demo.life.unit import (
 )
 from elevon.demo.steps import Work
 from elevon.errors import Interrupted
+from elevon.logs.log import Log
 from elevon.plain import plain, read_plain
+from elevon.prognose import Prognosis
 from elevon.prognose.life import Life
 from elevon.progress import Progress, part
-
-if TYPE_CHECKING:
-    from elevon.logs.log import Log
-    from elevon.prognose import Prognosis
 
 _PAGES = (
     "report.html",

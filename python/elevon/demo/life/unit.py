@@ -7,20 +7,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.demo.hidden import hidden_actuator
 from elevon.faults import Fault
 from elevon.prognose import Mission, Process, respond
 from elevon.prognose.law import Law
 from elevon.prognose.life import Life, run_to_failure
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
+from elevon.progress import Progress
 
 INSPECTED = 330.0
 """Flights between inspections, about."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from elevon.errors import SimulationError
+from elevon.progress import Progress
+from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.backlash.estimate import backlash_from_encoder, flat_lengths, lost_motion
 from elevon.reproduce.backlash.table import (
@@ -16,10 +18,6 @@ from elevon.reproduce.backlash.table import (
     formula_deg,
     measured_rows,
 )
-
-if TYPE_CHECKING:
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 ACTUATOR = "torino-rotary"
 FREQUENCY = 0.2

@@ -11,13 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import RangeError, SimulationError
-from elevon.progress import part
+from elevon.progress import Progress, part
+from elevon.recording import Recording
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult, BaselineRow
 from elevon.reproduce.nasa.capability import Capability
@@ -34,12 +36,7 @@ from elevon.reproduce.nasa.histories import time_histories
 from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, MotionProfile, profile_scenario
 from elevon.reproduce.nasa.store import CellStore, work_key
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.recording import Recording
-    from elevon.simulate import Run
+from elevon.simulate import Run
 
 Array = npt.NDArray[np.float64]
 Case = tuple[MotionProfile, float]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.errors import SimulationError
+from elevon.progress import Progress
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
 
 ACCELERATION = 1.0
 """m/s2 at a rounded corner (ASSUMED): 4 A of the 20 A there are."""

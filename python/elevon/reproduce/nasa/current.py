@@ -8,17 +8,15 @@ load actuator and sensors. What is compared is the way, not the paper's model wi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
+from elevon.progress import Progress
 from elevon.report.checks import Check, verdict
 from elevon.units import to_si
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
 
 ACTUATOR = "nasa-ballscrew"
 POUND_FORCE = float(to_si(1.0, "lbf"))

@@ -12,19 +12,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import SimulationError
-from elevon.progress import part
+from elevon.progress import Progress, part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
 
 Array = npt.NDArray[np.float64]
 

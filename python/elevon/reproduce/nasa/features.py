@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from elevon.recording import Recording
+from elevon.recording import Recording
 
 Array = npt.NDArray[np.float64]
 

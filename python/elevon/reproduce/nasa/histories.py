@@ -6,18 +6,16 @@ The paper draws its curves and prints no numbers of them; the conditions are tho
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import SimulationError
+from elevon.progress import Progress
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.units import to_si
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
 
 Array = npt.NDArray[np.float64]
 

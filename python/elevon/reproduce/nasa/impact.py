@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.features import FEATURES, PEAK
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
 
 Array = npt.NDArray[np.float64]
 Cells = Mapping[tuple[str, float], Mapping[str, Array]]

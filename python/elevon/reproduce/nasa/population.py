@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 import zlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
+from elevon.actuator import Actuator
 
 Kind = Literal["factor", "added", "vector", "range"]
 

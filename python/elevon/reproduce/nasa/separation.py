@@ -12,12 +12,13 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.progress import part
+from elevon.actuator import Actuator
+from elevon.progress import Progress, part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.corners import ACCELERATION
 from elevon.reproduce.nasa.effect import (
@@ -33,12 +34,7 @@ from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
 from elevon.reproduce.nasa.store import CellStore, work_key
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.simulate import Run
-
+from elevon.simulate import Run
 
 Array = npt.NDArray[np.float64]
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import SimulationError
 from elevon.parameters.relations import copper_loss
-from elevon.progress import part
+from elevon.progress import Progress, part
+from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.dema import DemaFit, fit_dema
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
-
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.progress import Progress
-    from elevon.recording import Recording
 
 Array = npt.NDArray[np.float64]
 
