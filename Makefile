@@ -60,7 +60,7 @@ check: $(STAMPS)/packages test-rust ## from a saved line of physics to its tests
 	PYTHONPATH=$(OVERLAY) $(BIN)/python -m pytest -q -n 2 -m "not long and not bench" $(CHECK)
 
 test-python: setup
-	$(BIN)/python -m pytest -q -n 2 -m "not long and not bench"
+	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m "not long and not bench"
 
 test-long: setup ## the checks that take minutes
 	$(BIN)/python -m pytest -q -n 2 -m "long and not bench"
