@@ -18,7 +18,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "elevon")
 
 
 def pytest_configure() -> None:
-    """Let Ctrl-C reach what the tests start: a shell's background job hands on that it is ignored."""
+    """Let Ctrl-C reach what the tests start: a shell's background job would hide it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
