@@ -32,7 +32,7 @@ _KINDS = {
     "fleet": "elevon.prognose.fleet:FleetPlan",
     "linear-model": "elevon.response.linear:LinearModel",
     "loop-response": "elevon.response.loop:LoopResponse",
-    "monitoring": "elevon.diagnose.monitor.monitor:Monitoring",
+    "monitoring": "elevon.diagnose.monitor.answer:Monitoring",
     "next-test": "elevon.nexttest.choose:NextTest",
     "prognosis": "elevon.prognose.answer:Prognosis",
     "response": "elevon.response.estimate:FrequencyResponse",

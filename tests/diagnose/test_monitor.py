@@ -1,6 +1,10 @@
 """Watching a stream: the filter in closed form, thresholds, alarms, the command."""
 
+import copy
+import io
 import json
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +17,8 @@ from elevon.bench.virtual import traced
 from elevon.diagnose.monitor import Monitor
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 from elevon.diagnose.monitor.threshold import simulated
-from elevon.diagnose.monitor.windows import CHANNELS
-from elevon.errors import InputError
+from elevon.diagnose.monitor.windows import ROLES
+from elevon.errors import FormatError, InputError
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
@@ -135,22 +139,92 @@ def test_a_fault_that_begins_is_told_soon_and_a_healthy_day_is_quiet(monitor, st
         assert 0.2 * severity < alarm.causes[0].severity < 1.2 * severity
 
 
-def test_samples_fed_in_any_portions_say_what_the_log_says(monitor, streams):
+def samples_of(item):
+    return {"time": item.time + item.start} | {r: item[r] for r in ROLES if item.has(r)}
+
+
+def test_samples_fed_in_any_portions_say_what_the_log_says_to_the_bit(monitor, streams):
     item = streams["backlash"]
     whole = monitor.fresh()
     whole.feed_log(item)
-    fed = monitor.fresh()
-    samples = {"time": item.time, "voltage_q_ref": item["torque_voltage"]}
-    samples |= {name: item[role] for name, role in CHANNELS.items()}
-    for part in np.array_split(np.arange(len(item.time)), 7):
-        fed.feed({name: values[part] for name, values in samples.items()})
-    count = len(fed.steps)
-    assert count >= len(whole.steps) - 1
-    assert [s.statistic for s in fed.steps] == pytest.approx(
-        [s.statistic for s in whole.steps[:count]], rel=1e-6
-    )
-    with pytest.raises(InputError, match="current_q_meas"):
-        fed.feed({"time": item.time})
+    for portions in (7, 900):
+        fed, steps = monitor.fresh(), []
+        for part in np.array_split(np.arange(len(item.time)), portions):
+            steps += fed.feed({n: values[part] for n, values in samples_of(item).items()})
+        steps += fed.finish()
+        assert [replace(s, log=item.name) for s in steps] == whole.steps
+        assert replace(fed.alarm, log="", since_log="") == replace(
+            whole.alarm, log="", since_log=""
+        )
+        assert fed.samples.missing == 0
+
+
+def test_a_stream_goes_on_from_its_state_to_the_bit(monitor, streams, tmp_path):
+    """Cut in the run-in, in a window and at a day's end; samples that come again are left out."""
+    item, file = streams["backlash"], tmp_path / "state"
+    samples = samples_of(item)
+    whole = monitor.fresh()
+    for _ in range(2):
+        whole.feed(samples)
+        whole.finish()
+        whole.new_day()
+    fed, steps, again = monitor.fresh(), [], 40
+    for day in range(2):
+        for first, last in ((0, 300), (300, 2000), (2000, 9000), (9000, len(item.time))):
+            at = slice(max(first - again, 0), last)
+            steps += fed.feed({name: values[at] for name, values in samples.items()})
+            fed.save(file)
+            fed = monitor.fresh()
+            fed.resume(file)
+        steps += fed.finish()
+        fed.new_day()
+        fed.save(file)
+        fed = monitor.fresh()
+        fed.resume(file)
+        assert fed.day == day + 1
+    left = [step.samples.doubled + step.samples.late for step in steps]
+    assert sum(left) > 100
+    clean = [replace(step, samples=w.samples) for step, w in zip(steps, whole.steps, strict=True)]
+    assert clean == whole.steps
+    assert fed.alarm == whole.alarm
+    assert fed.windows == whole.windows
+
+
+def test_a_state_of_another_monitor_or_none_is_refused(monitor, unit, streams, tmp_path):
+    file = tmp_path / "state"
+    monitor.fresh().save(file)
+    other = copy.copy(monitor.fresh())
+    other.false_alarm_time = 600.0
+    other.__dict__.pop("_inputs", None)
+    with pytest.raises(InputError, match="another time between false alarms"):
+        other.resume(file)
+    whole = file.read_bytes()
+    for damaged in (b"", b"{}", whole[: len(whole) // 2], whole[:200] + b"\0" * 99 + whole[299:]):
+        file.write_bytes(damaged)
+        with pytest.raises(FormatError):
+            monitor.fresh().resume(file)
+    with pytest.raises(InputError, match="cannot be read"):
+        monitor.fresh().resume(tmp_path / "none")
+
+
+def test_samples_that_are_none_are_refused(monitor, streams):
+    samples = {name: values[:10] for name, values in samples_of(streams["healthy"]).items()}
+    for changed, words in (
+        ({"motor_speed": None}, "motor_speed"),
+        ({"time": None}, "'time' is missing"),
+        ({"motor_sped": samples["motor_speed"]}, "did you mean 'motor_speed'"),
+        ({"encoder_position": samples["time"]}, "so has another channel"),
+        ({"motor_speed": [1.0]}, "10 time stamps, 1 values"),
+        ({"motor_speed": ["fast"] * 10}, "no numbers"),
+        ({"time": [*samples["time"][:9], np.nan]}, "must be finite"),
+    ):
+        given = {name: v for name, v in (samples | changed).items() if v is not None}
+        with pytest.raises(InputError, match=words):
+            monitor.fresh().feed(given)
+    begun = monitor.fresh()
+    begun.feed(samples)
+    with pytest.raises(InputError, match="same channels throughout"):
+        begun.feed({name: v for name, v in samples.items() if name != "torque_voltage"})
 
 
 def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
@@ -164,17 +238,6 @@ def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
         Monitor(unit, [streams["base"]], window=12.0)
 
 
-def test_windows_begin_a_second_after_the_motion_has(streams):
-    from elevon.diagnose.monitor.windows import run_in, top_speed
-
-    item = streams["healthy"]
-    top = top_speed(item)
-    rests = item.with_channels(motor_speed=np.where(item.time < 2.0, 0.0, top))
-    assert run_in(rests, top) == pytest.approx(3.0, abs=item.period)
-    standing = item.with_channels(motor_speed=0.0 * item.speed)
-    assert run_in(standing, top) is None
-
-
 def test_another_motion_is_left_out(monitor, streams):
     item = streams["healthy"]
     faster = item.with_channels(output_position=1.5 * item.output)
@@ -182,7 +245,14 @@ def test_another_motion_is_left_out(monitor, streams):
     assert {step.skipped for step in steps} == {"not the baselines' motion"}
 
 
-def test_the_command(elevon_cli, tmp_path):  # noqa: F811
+def stream(run, monkeypatch, data, options):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+    result = run("monitor", "-", *options)
+    assert result.code == 0, result.err
+    return [json.loads(line) for line in result.out.splitlines()]
+
+
+def test_the_command(elevon_cli, tmp_path, monkeypatch):  # noqa: F811
     logs = []
     for seed, fault in ((1, []), (2, ["--fault", "backlash@transmission=0.1 deg:step(time=11 s)"])):
         out = tmp_path / str(seed)
@@ -200,8 +270,29 @@ def test_the_command(elevon_cli, tmp_path):  # noqa: F811
     assert document["alarm"]["causes"][0]["kind"] == "backlash"
     assert len(document["steps"]) == 3  # the first second of motion is none
     assert document["steps"][0]["start"] >= 1.0
+    lines = stream(elevon_cli, monkeypatch, logs[1].read_bytes(), options)
+    assert [item["event"] for item in lines] == ["window"] * 3 + ["end"]
+    assert [{**step, "log": "stream"} for step in document["steps"]] == [
+        {name: item[name] for name in document["steps"][0]} for item in lines[:-1]
+    ]
+    assert [("first_alarm" in line) for line in lines].count(True) == 1
+    cut = logs[1].read_bytes()[:-9]
+    state = ["--state", tmp_path / "state"]
+    for k, part in enumerate((cut[:200_000], cut[200_000:])):
+        lines = stream(elevon_cli, monkeypatch, part, [*options, *state])
+        assert lines[-1]["ended"] == "in mid-line"
+        assert lines[-1]["samples"]["unreadable"] == k  # the line that was cut
+    assert lines[-1]["alarm"]["time"] == document["alarm"]["time"]
     answer = elevon_cli("monitor", logs[0], *options)
     assert "No alarm in" in answer.err + answer.out
     refused = elevon_cli("monitor", logs[1], *options, "--false-alarm-time", "0 s", "--json")
     assert refused.code == 2
     assert refused.out == ""
+    for words, why in (
+        (["-", "--json"], "one object"),
+        (["-", logs[0]], "alone"),
+        ([logs[0], "--state", "s"], "give - as the log"),
+    ):
+        refused = elevon_cli("monitor", *words, *options)
+        assert refused.code == 2
+        assert why in refused.err

@@ -33,6 +33,7 @@ class _Watch:
     noticed: bool = False
     code: int = INTERRUPTED
     closed: bool = False
+    later: bool = False
     story: str = ""
     hook: Callable[[Any], Any] = sys.unraisablehook
 
@@ -41,7 +42,8 @@ class _Watch:
         self.noticed = True
         if number == signal.SIGTERM:
             self.code = TERMINATED
-        raise KeyboardInterrupt
+        if not self.later:
+            raise KeyboardInterrupt
 
     def lost(self, report: Any) -> None:
         """Take Python's report of an exception that could not be raised."""
@@ -111,6 +113,17 @@ def check() -> None:
     """Stop the work if Ctrl-C was pressed and its exception was lost on the way."""
     if _watch.noticed:
         raise KeyboardInterrupt
+
+
+@contextmanager
+def postpone() -> Iterator[None]:
+    """Let work end that must not be cut in the middle: Ctrl-C stops what is behind it."""
+    _watch.later = True
+    try:
+        yield
+    finally:
+        _watch.later = False
+    check()
 
 
 def ignore() -> None:

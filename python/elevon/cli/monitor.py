@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from elevon.cli.calibrate import CommandOption, LoadcellOption, LogsArgument, MapOption, read
+from elevon.cli.calibrate import CommandOption, LoadcellOption, MapOption, read
 from elevon.cli.common import (
     ActuatorOption,
     DetailsOption,
@@ -16,19 +17,28 @@ from elevon.cli.common import (
     StrictOption,
     read_actuator,
 )
-from elevon.cli.output import answer, listed, print_json
+from elevon.cli.output import answer, listed, print_json, say
+from elevon.errors import InputError
+from elevon.files import check_output
 from elevon.number_text import severity_texts
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
-    from elevon.diagnose.monitor import Monitoring
+    from elevon.actuator import Actuator
+    from elevon.diagnose.monitor import Monitor, Monitoring
+    from elevon.logs.log import Log
 
 app = typer.Typer(rich_markup_mode=None)
 
 
 @app.command()
 def monitor(
-    logs: LogsArgument,
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG...", help="Drive logs; - reads lines from standard input as they come."
+        ),
+    ],
     *,
     actuator: ActuatorOption,
     baseline: Annotated[
@@ -46,6 +56,20 @@ def monitor(
         list[str] | None,
         typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
     ] = None,
+    days: Annotated[
+        int | None,
+        typer.Option(min=1, help="Days on which the unit is watched. Default: the logs; -: one."),
+    ] = None,
+    longest: Annotated[
+        str | None,
+        typer.Option(help="Longest of those days. Default: the logs'; -: that of the baselines."),
+    ] = None,
+    state: Annotated[
+        Path | None,
+        typer.Option(
+            "--state", metavar="FILE", help="Of -: where the stream stands; goes on from there."
+        ),
+    ] = None,
     loadcell: LoadcellOption = None,
     command: CommandOption = None,
     column_map: MapOption = None,
@@ -55,20 +79,78 @@ def monitor(
     json: JsonOption = False,
 ) -> None:
     """Watch logs window by window, in the order given, each a day of the unit; alarm at a fault."""
-    from elevon.diagnose.door import monitor as run
-
-    result = run(
-        read(logs, column_map, loadcell, command),
-        read_actuator(actuator, settings),
-        read(baseline, column_map),
+    options = WatchOptions(
         window=None if window is None else parse_quantity(window, "s", "--window"),
         false_alarm_time=parse_quantity(false_alarm_time, "s", "--false-alarm-time"),
+        days=days,
+        longest=None if longest is None else parse_quantity(longest, "s", "--longest"),
         faults=fault,
     )
+    healthy = read(baseline, column_map)
+    unit = read_actuator(actuator, settings)
+    if Path("-") in logs:
+        _check_stream(logs, loadcell, command, json=json)
+        watch = _monitor(unit, healthy, options, command)
+        _watch(watch, healthy, column_map, state)
+        return
+    if state is not None:
+        raise InputError("--state: serves a stream; give - as the log")
+    from elevon.diagnose.door import monitor as run
+
+    given = read(logs, column_map, loadcell, command)
+    result = run(given, unit, healthy, **options._asdict())
     if json:
         print_json(result.to_dict(stored=False))
     else:
         _print(result)
+
+
+class WatchOptions(NamedTuple):
+    """What a monitor is given beside its unit."""
+
+    window: float | None
+    false_alarm_time: float
+    days: int | None
+    longest: float | None
+    faults: list[str] | None
+
+
+def _check_stream(
+    logs: list[Path], loadcell: list[Path] | None, command: list[Path] | None, *, json: bool
+) -> None:
+    if len(logs) > 1:
+        raise InputError("-: standard input is watched alone, not beside other logs")
+    if loadcell:
+        raise InputError("--loadcell: has a clock of its own, which a stream cannot settle")
+    if command and len(command) > 1:
+        raise InputError(f"--command: {len(command)} given for one stream")
+    if json:
+        raise InputError("--json: prints one object; a stream prints one a line without it")
+
+
+def _monitor(
+    unit: Actuator, healthy: list[Log], options: WatchOptions, command: list[Path] | None
+) -> Monitor:
+    from elevon.diagnose.monitor import Monitor
+    from elevon.logs.command.note import read_command_note
+
+    note = read_command_note(command[0]) if command else None
+    given = options._replace(days=options.days or 1)._asdict()
+    return Monitor(unit, healthy, note=note, **given)
+
+
+def _watch(watch: Monitor, healthy: list[Log], column_map: Path | None, state: Path | None) -> None:
+    from elevon.cli.monitor_stream import known_factors, watch_stream
+    from elevon.logs.maps.column_map import find_map
+    from elevon.logs.stream import StreamReader
+
+    if state is not None:
+        check_output(state, force=True)
+    for text in watch.findings:
+        say(text)
+    layout = None if column_map is None else find_map(column_map)
+    reader = StreamReader(layout, watch.note, known_factors(healthy))
+    watch_stream(sys.stdin.buffer, reader, watch, state)
 
 
 def _print(result: Monitoring) -> None:

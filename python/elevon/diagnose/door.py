@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.answer import Diagnosis
-from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor, Monitoring
+from elevon.diagnose.monitor.answer import Monitoring
+from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor
 from elevon.errors import InputError, unknown
 from elevon.logs.drive import drive_log
 from elevon.logs.read import as_logs
@@ -137,6 +138,8 @@ def monitor(
     *,
     window: float | None = None,
     false_alarm_time: float = FALSE_ALARM_TIME,
+    days: int | None = None,
+    longest: float | None = None,
     faults: Sequence[str] | None = None,
 ) -> Monitoring:
     """Watch logs window by window, each a day of the unit; alarm where a fault begins.
@@ -155,6 +158,10 @@ def monitor(
         Width [s]; default: the period of a noted sine.
     false_alarm_time : float
         Mean time between false alarms [s].
+    days : int, optional
+        Days on which the unit is watched; default: as many as logs.
+    longest : float, optional
+        Length of the longest of them [s]; default: that of the longest log.
     faults : sequence of str, optional
         ``KIND@PLACE``; default: all candidates.
 
@@ -164,11 +171,12 @@ def monitor(
         As `Monitor`; no window that could be used.
     """
     begin = clock.perf_counter()
-    stream = [drive_log(log) for log in as_logs(logs)]
+    stream = as_logs(logs)
     watch = Monitor(
-        as_actuator(actuator), [drive_log(log) for log in as_logs(baselines)], window=window,
-        false_alarm_time=false_alarm_time, faults=faults, days=len(stream),
-        longest=max(item.duration for item in stream),
+        as_actuator(actuator), as_logs(baselines), window=window,
+        false_alarm_time=false_alarm_time, faults=faults,
+        days=len(stream) if days is None else days,
+        longest=max(item.duration for item in stream) if longest is None else longest,
     )  # fmt: skip
     for item in stream:
         watch.feed_log(item)

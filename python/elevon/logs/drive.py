@@ -59,6 +59,22 @@ def drive_log(log: Log) -> Log:
     return ready
 
 
+def drive_channels(log: Log) -> Log:
+    """Return a drive's log as it was recorded, on its own clock: gaps stay, nothing is thinned.
+
+    Raises
+    ------
+    InputError
+        No channel is the set point of the speed.
+    """
+    log = log.on("speed_ref")
+    voltage = _voltage(log)
+    channels = {role: values for role, values in log.channels.items() if role != "torque_voltage"}
+    if voltage is not None:
+        channels["torque_voltage"] = voltage
+    return replace(log, channels=channels, recording=None)
+
+
 def _voltage(log: Log) -> Floats | None:
     """The set point of the voltage, which a recording may hold beside the measured one."""
     known = log.recording

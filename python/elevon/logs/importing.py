@@ -122,11 +122,11 @@ def import_log(
     report = ImportReport(str(path), table.file_format)
     for text in table.notes:
         report.note("file", "format", text)
-    ratio = _ratio(gear_ratio, mapped, table, log_format)
+    ratio = gear_ratio_of(gear_ratio, mapped, table, log_format)
     assigned = assign_columns(table, mapped, ratio, report, layout=log_format)
     quality, time = _clock(table, assigned, report)
     settle_positions(assigned, table, time, quality.keep, ratio, report=report)
-    convention = _currents(assigned, mapped, note, report)
+    convention = settle_currents(assigned, mapped, note, report)
     recording = _build(table, assigned, quality, time, report=report)
     check_agreement(recording, ratio, report, mapped)
     examine_channels(recording, ratio, report)
@@ -217,7 +217,7 @@ def _begins_saved(file: Path) -> bool:
     return False
 
 
-def _ratio(
+def gear_ratio_of(
     given: float | None, mapped: ColumnMap | None, table: RawTable, layout: str
 ) -> float | None:
     """Motor over output, rad a rad or rad a m; None where nobody says it."""
@@ -254,7 +254,7 @@ def _clock(
     return quality, seconds[quality.keep]
 
 
-def _currents(
+def settle_currents(
     assigned: dict[str, Assignment],
     mapped: ColumnMap | None,
     note: CommandNote | None,
@@ -305,7 +305,8 @@ def _build(
     for signal, item in assigned.items():
         if signal != "time":
             channel = recording[signal]
-            report.channels.append(_channel_facts(signal, item.column, channel.values, channel))
+            facts = _channel_facts(signal, item.column, channel.values, channel)
+            report.channels.append(facts | {"factor": item.factor})
     return recording
 
 

@@ -14,11 +14,13 @@ are filtered at once, which gives the threshold.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.errors import FormatError
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,45 @@ class ChangeFilter:
         changes = [c for c in self.changes if c.opening is opening]
         return max(changes, key=lambda c: float(self._ratio(c)[stream].max()))
 
+    def arrays(self) -> dict[str, Floats]:
+        """Return where it stands, as arrays."""
+        out = {"state": self._state, "covariance": self._covariance}
+        out["opening"] = np.array([float(self._opening)])
+        for name, shape in self._shapes().items():
+            rows = [np.asarray(getattr(c, name), dtype=np.float64) for c in self.changes]
+            out[f"change_{name}"] = np.array(rows).reshape(len(rows), *shape)
+        return out
+
+    def take_arrays(self, arrays: Mapping[str, Floats], windows: int, place: str) -> None:
+        """Go on from where `arrays` was called, after so many windows.
+
+        Raises
+        ------
+        FormatError
+            Something is missing, of another shape, or not finite; `place` is named.
+        """
+        self._state = needed(arrays, "state", self._state.shape, place)
+        self._covariance = needed(arrays, "covariance", self._covariance.shape, place)
+        self._opening = bool(needed(arrays, "opening", (1,), place)[0])
+        count = len(needed(arrays, "change_window", (None,), place))
+        columns = [
+            needed(arrays, f"change_{name}", (count, *shape), place)
+            for name, shape in self._shapes().items()
+        ]
+        self.changes = [
+            Change(int(row[0]), bool(row[1]), *(part.copy() for part in row[2:]))
+            for row in zip(*columns, strict=True)
+        ]
+        self.windows = windows
+
+    def _shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shapes of what is carried for a change, in the order of its fields."""
+        streams, k = len(self._state), len(self._spread.noise)
+        return {
+            "window": (), "opening": (), "linear": (streams, k), "information": (k, k),
+            "moved": (2 * k, k),
+        }  # fmt: skip
+
     def _ratio(self, change: Change) -> Floats:
         """Best amplitude of each direction, none below zero: (u'c)^2 / (2 u'C u)."""
         along = np.maximum(change.linear @ self._directions.T, 0.0)
@@ -166,3 +207,25 @@ class ChangeFilter:
         self._covariance[k:, k:] += (1.0 - memory**2) * self._spread.day
         for change in self.changes:
             change.moved *= keep[:, None]
+
+
+def needed(
+    arrays: Mapping[str, Floats], name: str, shape: tuple[int | None, ...], place: str
+) -> Floats:
+    """Return a finite array of a shape (None: any length).
+
+    Raises
+    ------
+    FormatError
+        It is not there; `place` is named.
+    """
+    got = arrays.get(name)
+    alike = got is not None and len(got.shape) == len(shape)
+    if (
+        got is None
+        or not alike
+        or any(s not in (None, n) for s, n in zip(shape, got.shape, strict=True))
+        or not np.isfinite(got).all()
+    ):
+        raise FormatError(f"{place}: is damaged: {name} is missing, of another shape or not finite")
+    return got

@@ -2,168 +2,64 @@
 
 from __future__ import annotations
 
+import math
+import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.answer import Cause
 from elevon.diagnose.engine.candidates import chosen
+from elevon.diagnose.monitor.answer import Alarm, Monitoring, MonitorStep
 from elevon.diagnose.monitor.cause import likely_causes
+from elevon.diagnose.monitor.cutter import CutWindow, DayPlace, SampleCounts, WindowCutter
 from elevon.diagnose.monitor.filter import ChangeFilter
 from elevon.diagnose.monitor.reference import WindowReference, reference
+from elevon.diagnose.monitor.samples import by_role
+from elevon.diagnose.monitor.state import MonitorState, digest_of, read_state, write_state
 from elevon.diagnose.monitor.threshold import AlarmThresholds, simulated
 from elevon.diagnose.monitor.windows import (
-    CHANNELS,
-    cut,
+    Day,
     motion,
-    of_samples,
     period,
-    run_in,
+    stream_roles,
     top_speed,
+    usable,
     window_features,
 )
 from elevon.errors import InputError
-from elevon.logs.drive import drive_log
-from elevon.plain import Plain, in_unit
-from elevon.results import Result
+from elevon.logs.brake import Brake
+from elevon.logs.drive import drive_channels, drive_log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.command.note import CommandNote
     from elevon.logs.log import Log
 
 FALSE_ALARM_TIME = 3600.0  # s
-_WINDOWS = 40  # of a stream of unknown length, and the most that are simulated of a day
+_WINDOWS = 40  # the most that are simulated of a day
 _DAYS = 10  # the most that are simulated
 _LAST = 16  # windows back to which a change is sought
 _SAME = 0.2  # relative difference of motion up to which a window is of the baselines' motion
-
-
-@dataclass(frozen=True)
-class MonitorStep(Plain):
-    """One window.
-
-    Attributes
-    ----------
-    log : str
-        What it is a part of.
-    start, end : float
-        In the log or stream [s].
-    ratio : float
-        Log likelihood ratio of the likeliest change against none.
-    statistic : float
-        That over its threshold: an alarm above one.
-    alarm : bool
-        Whether it is above one.
-    skipped : str
-        Why the window was not used; empty where it was.
-    """
-
-    log: str
-    start: float
-    end: float
-    ratio: float
-    statistic: float
-    alarm: bool
-    skipped: str = ""
-
-
-@dataclass(frozen=True)
-class Alarm(Plain):
-    """The first window whose statistic is above one.
-
-    Attributes
-    ----------
-    log : str
-        What the window is a part of.
-    time : float
-        Its end, in the log [s].
-    since_log, since : str, float
-        Where the fault most likely began: a window's start.
-    delay : float
-        Watched time from there to the alarm [s].
-    opening : bool
-        Whether it was there from the first window of a log on.
-    statistic, ratio, threshold : float
-        As of the window; the threshold is that of the ratio.
-    causes : tuple of Cause
-        Single faults, most probable first, given that one has begun.
-    """
-
-    log: str
-    time: float
-    since_log: str
-    since: float
-    delay: float
-    opening: bool
-    statistic: float
-    ratio: float
-    threshold: float
-    causes: tuple[Cause, ...]
-
-
-@dataclass(frozen=True)
-class Monitoring(Result):
-    """What a monitor has seen.
-
-    Attributes
-    ----------
-    alarm : Alarm or None
-        The first one.
-    window, false_alarm_time : float
-        Width of a window, and mean time between false alarms [s].
-    thresholds : mapping of str to float
-        Of the ratio, for what begins with a log (``opening``) and in it (``within``).
-    steps : tuple of MonitorStep
-        The windows.
-    findings : tuple of str
-        What the caller should know.
-    seconds : float
-        Time it took.
-    """
-
-    alarm: Alarm | None
-    window: Annotated[float, in_unit("s")]
-    false_alarm_time: Annotated[float, in_unit("s")]
-    thresholds: Mapping[str, float]
-    steps: tuple[MonitorStep, ...]
-    findings: tuple[str, ...]
-    seconds: Annotated[float, in_unit("s")] = field(default=0.0, compare=False)
-
-    KIND: ClassVar = "monitoring"
-    COMPUTED: ClassVar = ("status",)
-    TABLE: ClassVar = "steps"
-    BARS: ClassVar = ("end", "statistic")
-
-    @property
-    def status(self) -> str:
-        """``quiet`` or ``alarm``."""
-        return "quiet" if self.alarm is None else "alarm"
-
-    @property
-    def headline(self) -> str:
-        """The answer in one sentence."""
-        used = [step for step in self.steps if not step.skipped]
-        if self.alarm is None:
-            return (
-                f"No alarm in {len(used)} windows of {self.window:g} s: the statistic came to "
-                f"{max(step.statistic for step in used):.2g} of its threshold."
-            )
-        return (
-            f"Alarm at {self.alarm.time:g} s of {self.alarm.log}: statistic "
-            f"{self.alarm.statistic:.3g} of its threshold; most likely since {self.alarm.since:g} "
-            f"s of {self.alarm.since_log} ({self.alarm.delay:g} s watched since)."
-        )
+_LISTED = 20_000  # windows that are kept for the result
+_WHY = {
+    "rest": "at rest: the motion has not begun",
+    "gap": "no samples",
+    "late": "late: the samples came after their windows were closed",
+}
 
 
 @dataclass
 class Monitor:
     """Watches windows of a unit that repeats the motion of its baselines.
 
-    Feed whole logs (`feed_log`), windows (`feed_window`) or samples as they come (`feed`); each
+    Feed whole logs (`feed_log`) or samples as they come (`feed`, and `finish` at their end); each
     gives the steps that became complete. `alarm` is None until the first one.
 
     Parameters
@@ -181,8 +77,10 @@ class Monitor:
     days : int
         Logs to come, or days on which the unit is watched without a stop.
     longest : float, optional
-        Length of the longest of them [s]; default: forty windows. Thresholds are simulated for
-        streams of that kind.
+        Length of the longest of them [s]; default: that of the longest baseline. Thresholds are
+        simulated for streams of that kind.
+    note : CommandNote, optional
+        What the operator knows of samples that are fed; default: as of the first baseline.
 
     Raises
     ------
@@ -197,6 +95,7 @@ class Monitor:
     faults: Sequence[str] | None = None
     days: int = 1
     longest: float | None = None
+    note: CommandNote | None = None
     alarm: Alarm | None = field(init=False, default=None)
     steps: list[MonitorStep] = field(init=False, default_factory=list)
     findings: list[str] = field(init=False, default_factory=list)
@@ -204,6 +103,7 @@ class Monitor:
     def __post_init__(self) -> None:
         self._check()
         self.baselines = [drive_log(log) for log in self.baselines]
+        self.note = self.note or self.baselines[0].note
         self._candidates = chosen(self.faults)
         self.width = period(self.baselines[0], self.window)
         self._reference = reference(self.actuator, self.baselines, self._candidates, self.width)
@@ -221,11 +121,18 @@ class Monitor:
 
     def _begin(self) -> None:
         self.alarm, self.steps = None, []
+        self.day = 0
+        self.heading = ""  # what a stream of lines began with, for whoever reads them on
+        self.counts = SampleCounts()  # of all samples
+        self.skipped: Counter[str] = Counter()  # windows left out, by the reason
+        self.top = 0.0  # the highest statistic
+        self._left_out = 0
         spread, directions = self._reference.spread, self._reference.directions
         self._filter = ChangeFilter(spread, directions, streams=1, last=_LAST)
-        self._used: list[MonitorStep] = []
-        self._pending: dict[str, list[Floats]] = {}
-        self._moves = False  # whether what the day begins with is past
+        self._used: dict[int, MonitorStep] = {}  # windows back to which a change is sought
+        self._opening = False
+        self._day: Day | None = None
+        self._cutter: WindowCutter | None = None
 
     @property
     def reference(self) -> WindowReference:
@@ -234,69 +141,168 @@ class Monitor:
 
     def new_day(self) -> None:
         """Say that the unit was stopped: its temperatures and friction are another day's."""
-        self._pending.clear()
-        self._moves = False
+        self._day = self._cutter = None
         self._filter.new_day()
 
     def feed_log(self, item: Log) -> list[MonitorStep]:
         """Take a whole log, as a day of its own; return a step for each whole window."""
         self.new_day()
-        item = drive_log(item)
-        parts = cut(item, self.width, start=run_in(item, self._top) or 0.0)
-        return [self.feed_window(part, start) for start, part in parts]
+        item = drive_channels(item)
+        day = Day.of(item)
+        self._open(day)
+        steps = self._take(item.time, day.table(item))
+        return steps + self.finish()
 
-    def feed(self, samples: Mapping[str, Floats]) -> list[MonitorStep]:
+    def feed(self, samples: Mapping[str, npt.ArrayLike]) -> list[MonitorStep]:
         """Take samples as they come, in any number; return the steps that became complete.
 
         Parameters
         ----------
-        samples : mapping of str to ndarray, shape (n,)
-            ``time`` and the signals of the stream, SI: ``encoder_position``,
-            ``resolver_position``, ``speed_ref``, ``motor_speed``, ``current_ref``,
-            ``current_q_meas``; where there are any ``voltage_q_ref`` and ``brake_torque``.
+        samples : mapping of str to array_like, shape (n,)
+            ``time`` and channels by role (or by a signal that has it), SI, NaN where a value is
+            missing: ``output_position``, ``motor_position``, ``speed_ref``, ``motor_speed``,
+            ``torque_current`` or ``current_ref`` or both; where there are any ``torque_voltage``
+            and ``brake_torque``. The same ones throughout a day. Samples that are late or doubled
+            are left out, those out of order are put in their place; all are counted in the steps.
 
         Raises
         ------
         InputError
-            A signal is missing.
+            A channel is missing or unknown, or not there all day; no finite time stamp; lengths
+            that differ.
         """
-        missing = [name for name in ("time", *CHANNELS) if name not in samples]
-        if missing:
-            raise InputError(f"stream: {', '.join(missing)} missing")
-        for name, values in samples.items():
-            self._pending.setdefault(name, []).append(np.asarray(values, dtype=np.float64))
-        pending = {name: np.concatenate(parts) for name, parts in self._pending.items()}
-        out, time = [], pending["time"]
-        while len(time) and time[-1] >= time[0] + self.width:
-            inside = time < time[0] + self.width - 0.5 * (time[1] - time[0])
-            part = {name: values[inside] for name, values in pending.items()}
-            item = of_samples(part, self.baselines[0].note, "stream")
-            if not self._moves:
-                lead = run_in(item, self._top)
-                self._moves = lead is not None
-                later = time >= time[0] + (self.width if lead is None else lead)
-                pending = {name: values[later] for name, values in pending.items()}
-                time = pending["time"]
-                continue
-            out.append(self.feed_window(item, float(time[0])))
-            pending = {name: values[~inside] for name, values in pending.items()}
-            time = pending["time"]
-        self._pending = {name: [values] for name, values in pending.items()}
-        return out
+        time, channels = by_role(samples)
+        roles = stream_roles("stream", list(channels))
+        if self._day is None:
+            self.day += 1
+            name = "stream" if self.day == 1 else f"stream, day {self.day}"
+            self._open(Day(name, roles, self.note, Brake.none()))
+        assert self._day is not None
+        if roles != self._day.roles:
+            raise InputError(
+                f"{self._day.name}: began with {', '.join(self._day.roles)}, goes on with "
+                f"{', '.join(roles)}; a day has the same channels throughout"
+            )
+        return self._take(time, np.column_stack([channels[role] for role in roles]))
 
-    def feed_window(self, item: Log, start: float = 0.0) -> MonitorStep:
-        """Take one window, which begins at `start` [s]; return what it says."""
-        step = self._step(item, start)
-        self.steps.append(step)
-        if step.alarm and self.alarm is None:
-            self.alarm = self._alarm(step, opening=self._opening)
-        return step
+    def leave_out(self, count: int) -> None:
+        """Count samples that could not be read; the next step states them."""
+        if self._cutter is None:
+            self.counts += SampleCounts(unreadable=count)
+        else:
+            self._cutter.pending += SampleCounts(unreadable=count)
+
+    def finish(self) -> list[MonitorStep]:
+        """Say that no more samples come for now; return the step of a last window that is whole."""
+        return [] if self._cutter is None else self._stepped(self._cutter.finish())
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write where the stream stands, whole; `resume` goes on from there without a gap.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written.
+        """
+        day, cutter = self._day, self._cutter
+        state = MonitorState(
+            self._inputs, self.day, day.name if day else "", self.heading, day.roles if day else (),
+            cutter.place if cutter else DayPlace(), cutter.pending if cutter else SampleCounts(),
+            self.counts, dict(self.skipped), self._filter.windows, self.top, self._opening,
+            tuple(self._used.items()), self.alarm,
+        )  # fmt: skip
+        arrays = {} if cutter is None else cutter.stored()
+        write_state(path, state, arrays | self._filter.arrays())
+
+    def resume(self, path: str | os.PathLike[str]) -> None:
+        """Go on from where `save` was called; `steps` begins anew.
+
+        Raises
+        ------
+        InputError
+            The file is of a monitor that was made of something else, or is none.
+        """
+        state, arrays = read_state(path, self._inputs)
+        self._begin()
+        self._filter.take_arrays(arrays, state.windows, os.fspath(path))
+        self.day, self.counts, self.top = state.day, state.counts, state.top
+        self.heading = state.heading
+        self.skipped, self.alarm = Counter(state.skipped), state.alarm
+        self._opening, self._used = state.opening, dict(state.used)
+        if state.name:
+            roles = stream_roles(os.fspath(path), state.roles)
+            self._open(Day(state.name, roles, self.note, Brake.none()))
+            assert self._cutter is not None
+            self._cutter.take_stored(state.place, state.pending, arrays, os.fspath(path))
+
+    @property
+    def samples(self) -> SampleCounts:
+        """What came so far; `taken` are those of whole windows."""
+        return self.counts if self._cutter is None else self.counts + self._cutter.pending
+
+    @property
+    def windows(self) -> int:
+        """How many windows were used."""
+        return self._filter.windows
+
+    @property
+    def latest(self) -> float | None:
+        """Time stamp of the stream's latest sample [s]; None before a day's first."""
+        place = None if self._cutter is None else self._cutter.place
+        return None if place is None or math.isnan(place.origin) else place.origin + place.last
+
+    @property
+    def origin(self) -> float | None:
+        """Time stamp of the day's first sample [s], from which steps are counted."""
+        place = None if self._cutter is None else self._cutter.place
+        return None if place is None or math.isnan(place.origin) else place.origin
+
+    @cached_property
+    def _inputs(self) -> dict[str, str]:
+        from elevon import __version__
+
+        return {
+            "version of elevon": __version__,
+            "actuator": self.actuator.hash,
+            "baseline": digest_of(self.baselines),
+            "window": repr(self.width),
+            "note": repr(self.note),
+            "time between false alarms": repr(self.false_alarm_time),
+            "list of faults": " ".join(c.key for c in self._candidates),
+            "number of days": repr(self.days),
+            "longest day": repr(self.longest),
+        }
 
     def result(self) -> Monitoring:
         """Return what it has seen so far."""
         levels = {"opening": self.thresholds.opening, "within": self.thresholds.within}
         steps, findings = tuple(self.steps), tuple(self.findings)
+        if self._left_out:
+            findings = (*findings, f"the first {self._left_out} windows are not listed")
         return Monitoring(self.alarm, self.width, self.false_alarm_time, levels, steps, findings)
+
+    def _open(self, day: Day) -> None:
+        self._day, self._cutter = day, day.cutter(self.width, self._top)
+
+    def _take(self, time: Floats, table: Floats) -> list[MonitorStep]:
+        assert self._cutter is not None
+        return self._stepped(self._cutter.take(time, table))
+
+    def _stepped(self, windows: Sequence[CutWindow]) -> list[MonitorStep]:
+        return [self._listed(self._step(window)) for window in windows]
+
+    def _listed(self, step: MonitorStep) -> MonitorStep:
+        self.steps.append(step)
+        if len(self.steps) > _LISTED:
+            del self.steps[0]
+            self._left_out += 1
+        self.counts += step.samples
+        self.top = max(self.top, step.statistic)
+        if step.skipped:
+            self.skipped[step.skipped] += 1
+        if step.alarm and self.alarm is None:
+            self.alarm = self._alarm(step, opening=self._opening)
+        return step
 
     def _check(self) -> None:
         if self.actuator.wiring != "rotary":
@@ -312,7 +318,9 @@ class Monitor:
             )
 
     def _simulated(self) -> AlarmThresholds:
-        windows = _WINDOWS if self.longest is None else int(self.longest / self.width)
+        if self.longest is None:
+            self.longest = max(log.duration for log in self.baselines)
+        windows = int(self.longest / self.width)
         return simulated(
             self._reference.spread,
             self._reference.directions,
@@ -336,26 +344,35 @@ class Monitor:
                 "partly assumed"
             )
 
-    def _step(self, item: Log, start: float) -> MonitorStep:
-        end = start + self.width
+    def _step(self, window: CutWindow) -> MonitorStep:
+        assert self._day is not None
+        step = MonitorStep(
+            self._day.name, window.start, window.end, 0.0, 0.0, False, _WHY.get(window.why, ""),
+            window.counts,
+        )  # fmt: skip
+        if step.skipped:
+            return step
+        if not usable(window):
+            return replace(step, skipped="hardly any motion, or no samples")
+        item = drive_log(self._day.log(window))
         if any(
             abs(a - b) > _SAME * max(abs(a), abs(b))
             for a, b in zip(motion(item), self._motion, strict=True)
         ):
-            return MonitorStep(item.name, start, end, 0.0, 0.0, False, "not the baselines' motion")
+            return replace(step, skipped="not the baselines' motion")
         features = window_features(item, self.actuator)
         if features is None:
-            return MonitorStep(
-                item.name, start, end, 0.0, 0.0, False, "hardly any motion, or no samples"
-            )
+            return replace(step, skipped="hardly any motion, or no samples")
         self._filter.step(self._reference.deviation(features)[None, :])
         ratios = [float(r[0]) for r in self._filter.ratios()]
         levels = [self.thresholds.opening, self.thresholds.within]
         parts = [r / level for r, level in zip(ratios, levels, strict=True)]
         top = int(np.argmax(parts))
         self._opening = top == 0
-        step = MonitorStep(item.name, start, end, ratios[top], parts[top], parts[top] > 1.0)
-        self._used.append(step)
+        step = replace(step, ratio=ratios[top], statistic=parts[top], alarm=parts[top] > 1.0)
+        self._used[self._filter.windows - 1] = step
+        sought = {change.window for change in self._filter.changes}
+        self._used = {number: s for number, s in self._used.items() if number in sought}
         return step
 
     def _alarm(self, step: MonitorStep, *, opening: bool) -> Alarm:
@@ -366,7 +383,7 @@ class Monitor:
             time=step.end,
             since_log=first.log,
             since=first.start,
-            delay=self.width * (len(self._used) - change.window),
+            delay=self.width * (self._filter.windows - change.window),
             opening=change.opening,
             statistic=step.statistic,
             ratio=step.ratio,

@@ -14,7 +14,7 @@ from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.healthy import DEGREES, healthy
 from elevon.diagnose.engine.replay import replay
 from elevon.diagnose.monitor.filter import WindowSpread
-from elevon.diagnose.monitor.windows import cut, run_in, stretch, top_speed, window_features
+from elevon.diagnose.monitor.windows import stretch, window_features, windows_of
 from elevon.diagnose.positions.features import FeatureVector
 from elevon.diagnose.positions.log import RUN_IN, prepared
 from elevon.errors import InputError
@@ -84,8 +84,9 @@ def reference(
     InputError
         Fewer than three windows in which the unit moves.
     """
-    parts = [cut(b, width, start=run_in(b, top_speed(b)) or 0.0) for b in baselines]
-    features = [[e for _, w in part if (e := window_features(w, actuator))] for part in parts]
+    features = [
+        [e for w in windows_of(b, width) if (e := window_features(w, actuator))] for b in baselines
+    ]
     count = sum(map(len, features))
     if count < _LEAST:
         raise InputError(

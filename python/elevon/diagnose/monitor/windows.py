@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.replay import logged_features
+from elevon.diagnose.monitor.cutter import CutWindow, WindowCutter
 from elevon.diagnose.positions.command import noted_command
 from elevon.diagnose.positions.features import FeatureVector
 from elevon.diagnose.positions.log import RUN_IN
 from elevon.errors import InputError
+from elevon.logs.brake import Brake
+from elevon.logs.drive import drive_log
+from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.command.note import CommandNote
-    from elevon.logs.log import Log
 
 _LEAST = 400  # samples of a window that may be used
 _MOVING = 0.1  # of the highest speed
-#: Signals of a stream, by the names they have everywhere, and the role of each.
-CHANNELS: Mapping[str, str] = {
-    "encoder_position": "output_position",
-    "resolver_position": "motor_position",
-    "speed_ref": "speed_ref",
-    "motor_speed": "motor_speed",
-    "current_ref": "current_ref",
-    "current_q_meas": "torque_current",
-}
+_COUNTS = "good"  # a channel of ours: NaN where a sample of a log does not count
+#: Without these, and one of the currents, a stream cannot be watched.
+NEEDED = ("speed_ref", "motor_speed", "motor_position", "output_position")
+CURRENTS = ("torque_current", "current_ref")  # the measured one first
+#: All that is read of a stream. ``brake_torque``: on the motor's shaft [N m], as a baseline's load
+#: cell gives it.
+ROLES = (*NEEDED, *CURRENTS, "torque_voltage", "brake_torque")
 
 
 def period(log: Log, window: float | None) -> float:
@@ -61,41 +62,23 @@ def top_speed(log: Log) -> float:
     return float(np.nanmax(np.where(log.good, np.abs(log.speed), 0.0), initial=0.0))
 
 
-def run_in(log: Log, top: float) -> float | None:
-    """Return how much of a day's beginning is no window [s]: rest, and the start of the motion.
-
-    A drive that sets off shows inertia and ripple that no window of the motion itself shows.
-
-    Parameters
-    ----------
-    log : Log
-        What the day begins with.
-    top : float
-        Highest speed of the motion [rad/s].
-
-    Returns
-    -------
-    float or None
-        None where it rests throughout.
-    """
-    fast = log.good & (np.abs(log.speed) > _MOVING * top)
-    if not fast.any():
-        return None
-    # Half a sample before one, so that rounding decides nothing.
-    return float(log.time[np.argmax(fast)] - log.time[0]) + RUN_IN - 0.5 * log.period
-
-
-def cut(log: Log, width: float, *, start: float = 0.0) -> Iterator[tuple[float, Log]]:
-    """Yield the whole windows of a log, each with the instant it begins [s]."""
-    first = start
-    while first + width <= log.duration + log.period:
-        yield first, stretch(log, first, first + width)
-        first += width
+def windows_of(log: Log, width: float) -> Iterator[Log]:
+    """Yield the whole windows of a log in which its unit may move, as a monitor cuts them."""
+    day = Day.of(log)
+    cutter = day.cutter(width, top_speed(log))
+    for window in [*cutter.take(log.time, day.table(log)), *cutter.finish()]:
+        if window.why == "window" and usable(window):
+            yield drive_log(day.log(window))
 
 
 def stretch(log: Log, first: float, last: float) -> Log:
     """Return a part of a log, on a clock of its own."""
     return log.part((log.time >= first) & (log.time < last), first, last)
+
+
+def usable(window: CutWindow) -> bool:
+    """Whether a window has enough samples that count."""
+    return window.counts.taken - window.counts.empty >= _LEAST
 
 
 def window_features(log: Log, actuator: Actuator) -> FeatureVector | None:
@@ -119,20 +102,76 @@ def motion(log: Log) -> tuple[float, float, float]:
     return float(np.nanstd(log.output)), speed, brake
 
 
-def of_samples(samples: Mapping[str, Floats], note: CommandNote | None, name: str) -> Log:
-    """Return the log of samples, shape (n,) each, SI.
+@dataclass(frozen=True)
+class Day:
+    """What the samples of a day have in common.
 
-    `time`, `CHANNELS`, and where there are any ``voltage_q_ref`` and ``brake_torque``.
+    Attributes
+    ----------
+    name : str
+        Of the log or stream.
+    roles : tuple of str
+        Of its channels, in their order.
+    note : CommandNote or None
+        What the operator knows.
+    brake : Brake
+        As measured; a channel ``brake_torque`` takes its place.
     """
-    from elevon.logs.brake import Brake
-    from elevon.logs.log import Log
 
-    time = samples["time"] - samples["time"][0]
-    level = samples.get("brake_torque")
-    brake = Brake.none() if level is None else Brake("torque", time, level)
-    channels = {role: samples[signal] for signal, role in CHANNELS.items()}
-    good = np.all([np.isfinite(values) for values in channels.values()], axis=0)
-    if "voltage_q_ref" in samples:
-        channels["torque_voltage"] = samples["voltage_q_ref"]
-    start = float(samples["time"][0])
-    return Log(name, time, channels, good=good, start=start, note=note, brake=brake)
+    name: str
+    roles: tuple[str, ...]
+    note: CommandNote | None
+    brake: Brake
+
+    @classmethod
+    def of(cls, log: Log) -> Day:
+        """Return the day that a log is."""
+        roles = stream_roles(log.name, list(log.channels))
+        return cls(log.name, roles if log.good.all() else (*roles, _COUNTS), log.note, log.brake)
+
+    @staticmethod
+    def _good(log: Log) -> Floats:
+        return np.where(log.good, 1.0, np.nan)
+
+    def table(self, log: Log) -> Floats:
+        """Return the channels of a log, shape (n, c)."""
+        return np.column_stack(
+            [self._good(log) if role == _COUNTS else log[role] for role in self.roles]
+        )
+
+    def cutter(self, width: float, top: float) -> WindowCutter:
+        """Return what cuts the day; `top` is the highest speed of the motion."""
+        current = next(role for role in CURRENTS if role in self.roles)
+        needed = [self.roles.index(role) for role in (*NEEDED, current)]
+        needed += [self.roles.index(role) for role in self.roles if role == _COUNTS]
+        speed = self.roles.index("motor_speed")
+        return WindowCutter(width, RUN_IN, _MOVING * top, speed, needed)
+
+    def log(self, window: CutWindow) -> Log:
+        """Return a window as a log of its own, as it came."""
+        channels = {role: window.values[:, k] for k, role in enumerate(self.roles)}
+        good = np.isfinite(channels.pop(_COUNTS, np.zeros(len(window.time))))
+        level, brake = channels.pop("brake_torque", None), self.brake
+        if level is not None:
+            brake = Brake("torque", window.time, level)
+        log = Log(self.name, window.time, channels, good=good, note=self.note, brake=brake)
+        return log.part(np.ones(len(window.time), dtype=np.bool_), window.start, window.end)
+
+
+def stream_roles(name: str, roles: Sequence[str]) -> tuple[str, ...]:
+    """Return those roles that are watched.
+
+    Raises
+    ------
+    InputError
+        One that is needed is missing.
+    """
+    missing = [role for role in NEEDED if role not in roles]
+    if not any(role in roles for role in CURRENTS):
+        missing.append(" or ".join(CURRENTS))
+    if missing:
+        raise InputError(
+            f"{name}: no channel has the role {', '.join(missing)}; watching needs both positions, "
+            f"speed, its set point and a torque current; roles: {', '.join(roles) or 'none'}"
+        )
+    return tuple(role for role in ROLES if role in roles)

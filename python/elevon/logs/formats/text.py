@@ -19,7 +19,7 @@ import numpy as np
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import open_bytes
-from elevon.logs.formats.table import RawTable, split_unit, unique_names
+from elevon.logs.formats.table import FloatArray, RawTable, split_unit, unique_names
 
 _MISSING = {"", "nan"}
 _BYTES_PER_VALUE = 32
@@ -63,12 +63,16 @@ def read_text_table(
     """
     file = existing_file(path, limits)
     with open_bytes(file) as stream:
-        return _Reader(str(file), limits, text_columns).read(stream, header)
+        return LineReader(str(file), limits, text_columns).read(stream, header)
 
 
 @dataclass
-class _Reader:
-    """State of one reading: the dialect found so far and the numbers collected."""
+class LineReader:
+    """State of one reading: the dialect found so far and the numbers collected.
+
+    A file is read whole (`read`). Of a stream each line is taken as it comes: `decode`, `preface`,
+    `begin` with the first line behind the preface, then `row`; `drain` gives what was collected.
+    """
 
     source: str
     limits: Limits
@@ -85,21 +89,32 @@ class _Reader:
     ended: bool = True
 
     def read(self, stream: IO[bytes], header: bool | None) -> RawTable:
+        """Read all lines."""
         lines = self._lines(stream)
-        first = self._first(lines)
+        first = next(((n, text) for n, text in lines if not self.preface(text)), None)
         if first is None:
             raise FormatError(f"{self.source}: holds no line of text")
-        number, line = first
+        names = self.begin(first[1], first[0], header)
+        for position, text in lines:
+            self.row(text, position, len(names))
+        return self._table(names)
+
+    def begin(self, line: str, number: int, header: bool | None) -> list[str]:
+        """Take the first line behind the preface; return the names of the columns."""
         names, start = self._names(line, number, header)
         trailing = len(names) > 1 and not names[-1].strip()
         names = unique_names(self.source, names[:-1] if trailing else names)
         self.limits.check_shape(self.source, 1, len(names))
         self.words = {k: {} for k, name in enumerate(names) if name in self.text_columns}
         if start:
-            self._row(start[1], start[0], len(names))
-        for position, text in lines:
-            self._row(text, position, len(names))
-        return self._table(names)
+            self.row(start[1], start[0], len(names))
+        return names
+
+    def drain(self) -> list[float]:
+        """Return the numbers collected since the last time."""
+        numbers = self.values.tolist()
+        del self.values[:]
+        return numbers
 
     def _lines(self, stream: IO[bytes]) -> Iterator[tuple[int, str]]:
         number = 0
@@ -114,7 +129,7 @@ class _Reader:
             if self.expanded > _BYTES_PER_VALUE * self.limits.values:
                 raise FormatError(f"{self.source}: expands to more than {self.expanded} bytes")
             self.ended = raw.endswith(b"\n")
-            text = self._decode(raw, number).rstrip("\r\n")
+            text = self.decode(raw, number).rstrip("\r\n")
             if not text.strip():
                 blank += 1
                 continue
@@ -122,7 +137,8 @@ class _Reader:
         if blank:
             self.notes.append(f"{blank} blank lines passed over")
 
-    def _decode(self, raw: bytes, number: int) -> str:
+    def decode(self, raw: bytes, number: int) -> str:
+        """Return the text of a line."""
         if number == 1 and raw.startswith(b"\xef\xbb\xbf"):
             raw = raw[3:]
             self.notes.append("UTF-8 byte-order mark")
@@ -143,16 +159,16 @@ class _Reader:
             self.notes.append(f"{encoding} text")
         return text
 
-    def _first(self, lines: Iterator[tuple[int, str]]) -> tuple[int, str] | None:
-        for number, line in lines:
-            if line.lower().startswith("sep=") and len(line) == 5:
-                self.delimiter = line[4]
-            elif line.startswith("#"):
-                if len(self.notes) < _COMMENTS:
-                    self.notes.append(f"comment: {quoted(line[1:].strip())}")
-            else:
-                return number, line
-        return None
+    def preface(self, line: str) -> bool:
+        """Take a line that stands before the table; whether it is one."""
+        if line.lower().startswith("sep=") and len(line) == 5:
+            self.delimiter = line[4]
+        elif line.startswith("#"):
+            if len(self.notes) < _COMMENTS:
+                self.notes.append(f"comment: {quoted(line[1:].strip())}")
+        else:
+            return False
+        return True
 
     def _names(
         self, line: str, number: int, header: bool | None
@@ -181,7 +197,8 @@ class _Reader:
             return line.split()
         return line.split(self.delimiter)
 
-    def _row(self, line: str, number: int, columns: int) -> None:
+    def row(self, line: str, number: int, columns: int) -> None:
+        """Take a row of the table."""
         cells = self._split(line, number)
         if len(cells) == columns + 1 and not cells[-1].strip():
             cells.pop()  # a delimiter at the end of the line
@@ -251,13 +268,20 @@ class _Reader:
         data = np.frombuffer(self.values, dtype=np.float64).reshape(-1, len(names))
         if not self.ended:
             self.notes.append("the last line has no line end: its last number may be cut short")
-        pairs = [split_unit(name) for name in names]
-        short = [name for name, _ in pairs]
-        labels = short if len(set(short)) == len(short) else names
-        columns = {label: data[:, k].copy() for k, label in enumerate(labels)}
-        units = {label: unit for label, (_, unit) in zip(labels, pairs, strict=True) if unit}
+        columns, units = named_columns(names, data)
         words = {names[k]: "\n".join(values) for k, values in self.words.items()}
         return RawTable(self.source, columns, units, tuple(self.notes), "csv", words)
+
+
+def named_columns(
+    names: list[str], data: FloatArray
+) -> tuple[dict[str, FloatArray], dict[str, str]]:
+    """Return the columns of a table, shape (n, c), by name, and the units that the names state."""
+    pairs = [split_unit(name) for name in names]
+    short = [name for name, _ in pairs]
+    labels = short if len(set(short)) == len(short) else names
+    columns = {label: data[:, k].copy() for k, label in enumerate(labels)}
+    return columns, {label: unit for label, (_, unit) in zip(labels, pairs, strict=True) if unit}
 
 
 def _delimiter(line: str) -> str:
