@@ -44,7 +44,7 @@ def ends_table(
 
     known = signal_records(resolved.wiring, resolved.fidelity)
     rows = [
-        final_values(item, result.get("final", {}))
+        final_values(result.get("final", {}), {name for plan in item.plan for name in plan.signals})
         for item, result in zip(prepared, results, strict=True)
     ]
     names = dict.fromkeys(name for row in rows for name in row)

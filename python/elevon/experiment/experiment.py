@@ -111,7 +111,7 @@ class Experiment:
             plan = replace(plan, period_steps=max(1, int(period / ready.step + 1e-6)))
         tables = {} if isinstance(inputs, Scenario) else inputs.tables(log.name)
         core = {**ready.core, "inputs": _filled(ready.core["inputs"], tables)}
-        self._prepared = replace(ready, core=core, plan=[plan])
+        self._prepared = replace(ready, core=core, plan=(plan,))
         self._place = positions(actuator.wiring)
 
     @property

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from elevon.errors import InputError, unknown
 from elevon.parameters.parameter import Parameter
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from elevon.report.cards import Html
+
+
+Result = TypeVar("Result")
 
 
 class ParameterSet(Mapping[str, Parameter]):
@@ -42,7 +45,7 @@ class ParameterSet(Mapping[str, Parameter]):
         A parameter without a default is missing.
     """
 
-    __slots__ = ("_away", "_hash", "_items", "_vector", "wiring")
+    __slots__ = ("_away", "_hash", "_items", "_known", "_vector", "wiring")
 
     def __init__(self, wiring: str, entries: Mapping[str, Parameter], place: str = "") -> None:
         known = records(wiring)
@@ -62,6 +65,7 @@ class ParameterSet(Mapping[str, Parameter]):
         self._vector: npt.NDArray[np.float64] | None = None
         self._hash: str | None = None
         self._away: Mapping[str, str] | None = None
+        self._known: dict[Hashable, Any] = {}
 
     def __getitem__(self, path: str) -> Parameter:
         try:
@@ -184,6 +188,13 @@ class ParameterSet(Mapping[str, Parameter]):
             vector[place[path]] = known[path].number(items[path].value)
         vector.flags.writeable = False
         return vector
+
+    def once(self, key: Hashable, make: Callable[[], Result]) -> Result:
+        """Return what `make` returns, which depends on these values and `key` alone; made once."""
+        if key not in self._known:
+            self._known[key] = make()
+        result: Result = self._known[key]
+        return result
 
     @property
     def hash(self) -> str:

@@ -1,6 +1,7 @@
 """One recorded quantity."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -47,23 +48,16 @@ class Channel:
     def __init__(
         self, name: str, unit: str, values: npt.ArrayLike, clock: Clock, text: str = ""
     ) -> None:
-        check_name(name)
-        parsed = parse_unit(unit, f"channel {name!r}")
-        if parsed.factor != 1.0 or parsed.offset:
-            raise UnitError(f"channel {name!r}: unit {unit!r} is not SI; Recording.build converts")
+        _check_description(name, unit, text)
         vector = frozen(values, f"channel {name!r}")
         if vector.size != len(clock):
             raise InputError(
                 f"channel {name!r}: {vector.size} values for the {len(clock)} instants "
                 f"of clock {clock.name!r}"
             )
-        if len(text) > _LONGEST_TEXT or not text.isprintable():
-            raise InputError(
-                f"channel {name!r}: its text has control characters or more than {_LONGEST_TEXT}"
-            )
-        pairs = {"name": name, "unit": unit, "values": vector, "clock": clock, "text": text}
-        for key, value in pairs.items():
-            object.__setattr__(self, key, value)
+        fields = self.__dict__
+        fields["name"], fields["unit"], fields["text"] = name, unit, text
+        fields["values"], fields["clock"] = vector, clock
 
     @property
     def time(self) -> npt.NDArray[np.float64]:
@@ -94,6 +88,19 @@ class Channel:
             same
             and self.clock.equals(other.clock)
             and self.values.tobytes() == other.values.tobytes()
+        )
+
+
+@lru_cache(maxsize=4096)
+def _check_description(name: str, unit: str, text: str) -> None:
+    """Raise where a name, a unit or a text cannot be; the runs of a batch have the same ones."""
+    check_name(name)
+    parsed = parse_unit(unit, f"channel {name!r}")
+    if parsed.factor != 1.0 or parsed.offset:
+        raise UnitError(f"channel {name!r}: unit {unit!r} is not SI; Recording.build converts")
+    if len(text) > _LONGEST_TEXT or not text.isprintable():
+        raise InputError(
+            f"channel {name!r}: its text has control characters or more than {_LONGEST_TEXT}"
         )
 
 

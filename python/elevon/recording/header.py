@@ -165,6 +165,8 @@ def plain(value: Any, place: str, depth: int = 0) -> Any:
         Something in it is not text, a number, a truth value, None, a sequence or a mapping; or a
         NumPy array; or it is nested deeper than 50 levels.
     """
+    if type(value) in _PLAIN:
+        return value
     if depth > _DEEPEST:
         raise InputError(f"{place}: nested deeper than {_DEEPEST} levels")
     if isinstance(value, (np.generic, np.ndarray)):
@@ -174,7 +176,9 @@ def plain(value: Any, place: str, depth: int = 0) -> Any:
     # Most items are plain already: their places are not written out.
     if isinstance(value, Mapping):
         return {
-            str(k): v if type(v) in _PLAIN else plain(v, f"{place}.{k}", depth + 1)
+            k if type(k) is str else str(k): v
+            if type(v) in _PLAIN
+            else plain(v, f"{place}.{k}", depth + 1)
             for k, v in value.items()
         }
     if isinstance(value, (list, tuple)):

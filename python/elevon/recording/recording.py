@@ -82,7 +82,7 @@ class Recording:
             self._channels[channel.name] = channel
         self.meta: dict[str, Any] = plain(dict(meta or {}), "meta")
         self.labels: Any = plain(labels if labels is not None else [], "labels")
-        self.final: dict[str, float] = plain(dict(final or {}), "final")
+        self.final: dict[str, float] = plain(final or {}, "final")
 
     def _add_clock(self, clock: Clock) -> None:
         if self.clocks.setdefault(clock.name, clock) is not clock:

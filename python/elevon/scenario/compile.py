@@ -133,7 +133,8 @@ def _ports(
             raise InputError(f"{place}: the actuator has no such input; {', '.join(known)}")
 
 
-def port_units(mode: str, wiring: str) -> dict[str, str]:
+@lru_cache(maxsize=32)
+def port_units(mode: str, wiring: str) -> Mapping[str, str]:
     """Return the unit of every port; that of the command goes with its mode."""
     from elevon import _core
 
@@ -175,8 +176,9 @@ def compile_term(term: Term, port_unit: str, place: str) -> dict[str, Any]:
     """Return one waveform as the core takes it, for a quantity in the SI unit `own`."""
     record = wave_records()[term.kind]
     values: dict[str, float] = {}
+    arguments = term.arguments
     for parameter in record.parameters:
-        given = term.arguments.get(parameter.name)
+        given = arguments.get(parameter.name)
         if given is None:
             assert parameter.default is not None  # the model checked that it is given
             values[parameter.name] = float(parameter.default)
@@ -215,6 +217,8 @@ def _table(term: Term, port_unit: str, place: str) -> dict[str, Any]:
 def _initial(scenario: Scenario, wiring: str, fidelity: str) -> dict[str, float]:
     from elevon import _core
 
+    if not scenario.initial:
+        return {}
     units = signal_units(wiring, fidelity)
     settable = _core.initial(wiring, fidelity)
     read = {}

@@ -12,7 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.errors import ElevonWarning, FindingWarning, NotActingError, NotActingWarning
+from elevon.errors import (
+    ElevonWarning,
+    FindingWarning,
+    InputError,
+    NotActingError,
+    NotActingWarning,
+)
 from elevon.faults import find_record
 from elevon.parameters import records
 from elevon.parameters.records import positions
@@ -45,8 +51,6 @@ def check_values(actuator: Actuator, fidelity: str) -> list[Notice]:
     InputError
         The core refuses them.
     """
-    from elevon.errors import InputError
-
     findings = actuator.findings(fidelity)
     wrong = [item for item in findings if item.get("severity", "error") == "error"]
     if wrong:
@@ -56,6 +60,14 @@ def check_values(actuator: Actuator, fidelity: str) -> list[Notice]:
 
 def not_acting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Notice]:
     """Return what the caller set away from neutral where it has no effect in this run."""
+    if compiled.faults:
+        return _resting(actuator, compiled, fidelity)
+    # Without faults the values alone decide: of many runs with the same ones it is looked up once.
+    key = ("not acting", fidelity, compiled.command_mode)
+    return list(actuator.parameters.once(key, lambda: _resting(actuator, compiled, fidelity)))
+
+
+def _resting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Notice]:
     notices = _reasons(actuator, compiled, fidelity)
     return [
         Notice(NotActingWarning, f"{name} has no effect: {reason}")

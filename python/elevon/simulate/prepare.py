@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from elevon.parameters import records
 from elevon.parameters.records import wirings
 from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
-from elevon.scenario.compile import signal_records
+from elevon.scenario.compile import signal_units
 from elevon.simulate.acting import Notice, check_values, not_acting
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 from elevon.simulate.stroke import check_stroke
@@ -70,7 +71,7 @@ class Prepared:
 
     actuator: Actuator
     core: dict[str, Any]
-    plan: list[ClockPlan]
+    plan: tuple[ClockPlan, ...]
     step: float
     bytes: int
     command_unit: str
@@ -122,10 +123,9 @@ def prepare(
     step = solver_step(actuator, fidelity)
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
     check_stroke(compiled, actuator)
-    known = signal_records(actuator.wiring, fidelity)
-    units = {name: item["unit"] for name, item in known.items()}
     bare = features is not None and record is not None and not len(record)
-    plan = [] if bare else record_plan(record, units, step)
+    texts = record if isinstance(record, str) or record is None else tuple(record)
+    plan = () if bare else _clocks(texts, actuator.wiring, fidelity, step)
     summed = feature_plans(
         features,
         actuator.wiring,
@@ -163,6 +163,14 @@ def prepare(
         (*findings, *(not_acting(actuator, compiled, fidelity) if notices else ())),
         summed,
     )
+
+
+@lru_cache(maxsize=256)
+def _clocks(
+    record: str | tuple[str, ...] | None, wiring: str, fidelity: str, step: float
+) -> tuple[ClockPlan, ...]:
+    """Return what is kept, of runs of one model and step."""
+    return tuple(record_plan(record, signal_units(wiring, fidelity), step))
 
 
 def check_fidelity(wiring: str, fidelity: str) -> None:

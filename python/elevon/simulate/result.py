@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,8 @@ from elevon.record_plan import ClockPlan
 from elevon.recording import Channel, Clock, Recording
 from elevon.scenario.compile import signal_records
 from elevon.simulate.prepare import Prepared, Run
+
+Value = TypeVar("Value")
 
 
 def build_recording(
@@ -29,35 +33,61 @@ def build_recording(
     """
     channels: list[Channel] = []
     clocks: list[Clock] = []
+    layout = _layout(prepared.actuator.wiring, fidelity, prepared.command_unit, prepared.plan)
     for index, plan in enumerate(prepared.plan):
         rows = result["clocks"][plan.name]
         key = (plan.name, plan.rate, id(rows["time"]))
         clock = shared.get(key) or shared.setdefault(key, Clock(plan.name, rows["time"], plan.rate))
         clocks.append(clock)
-        channels.extend(_channels(prepared, fidelity, plan, clock, rows["values"]))
+        columns = rows["values"].T
+        channels.extend(
+            Channel(name, unit, columns[column], clock, text)
+            for column, (name, unit, text) in enumerate(layout.described[index])
+        )
         if index == 0:
             channels.extend(_severities(prepared, clock, rows["values"][:, len(plan.signals) :]))
     return Recording(
         channels,
         clocks=clocks,
-        meta=_meta(run, prepared, fidelity, result),
+        meta=_meta(run, prepared, fidelity, result, layout),
         labels=fault_labels(prepared),
-        final=final_values(prepared, result["final"]),
+        final={name: result["final"][name] for name in layout.final},
     )
 
 
-def _channels(
-    prepared: Prepared,
-    fidelity: str,
-    plan: ClockPlan,
-    clock: Clock,
-    values: npt.NDArray[np.float64],
-) -> Iterator[Channel]:
-    known = signal_records(prepared.actuator.wiring, fidelity)
-    for column, name in enumerate(plan.signals):
-        item = known[name]
-        unit = prepared.command_unit if name == "command" else item["unit"] or "1"
-        yield Channel(name, unit, values[:, column], clock, item["text"])
+def final_values(values: Mapping[str, Value], recorded: Container[str]) -> dict[str, Value]:
+    """Leave unrecorded energies out of last values by signal: the core does not sum them."""
+    return {n: x for n, x in values.items() if n in recorded or not n.startswith("energy_")}
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """What the recordings of runs of one model and plan have in common."""
+
+    #: Name, unit and text of the channels of each clock.
+    described: tuple[tuple[tuple[str, str, str], ...], ...]
+    #: Role to signal.
+    roles: Mapping[str, str]
+    #: The signals whose last value is given.
+    final: tuple[str, ...]
+
+
+@lru_cache(maxsize=256)
+def _layout(wiring: str, fidelity: str, command_unit: str, plans: tuple[ClockPlan, ...]) -> _Layout:
+    known = signal_records(wiring, fidelity)
+    recorded = {name for plan in plans for name in plan.signals}
+
+    def described(name: str) -> tuple[str, str, str]:
+        unit = command_unit if name == "command" else known[name]["unit"] or "1"
+        return name, unit, known[name]["text"]
+
+    # Of several the last, since a sensor stands behind what it senses.
+    played = {name: item.get("role") for name, item in known.items() if name in recorded}
+    return _Layout(
+        tuple(tuple(described(name) for name in plan.signals) for plan in plans),
+        {role: name for name, role in played.items() if role},
+        tuple(final_values(known, recorded)),
+    )
 
 
 def _severities(
@@ -67,16 +97,6 @@ def _severities(
     for column, label in enumerate(fault_labels(prepared)):
         text = f"severity of {label['kind']}@{label['place']}"
         yield Channel(label["channel"], label["unit"], values[:, column], clock, text)
-
-
-def final_values(prepared: Prepared, values: Mapping[str, float]) -> dict[str, float]:
-    """Last values; the core sums energies only where they are recorded, so others are left out."""
-    recorded = {name for plan in prepared.plan for name in plan.signals}
-    return {
-        name: value
-        for name, value in values.items()
-        if name in recorded or not name.startswith("energy_")
-    }
 
 
 def fault_labels(prepared: Prepared) -> list[dict[str, Any]]:
@@ -96,7 +116,9 @@ def fault_labels(prepared: Prepared) -> list[dict[str, Any]]:
     ]
 
 
-def _meta(run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any]) -> dict[str, Any]:
+def _meta(
+    run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any], layout: _Layout
+) -> dict[str, Any]:
     from elevon import _core
 
     steps = int(result["steps"])
@@ -117,7 +139,7 @@ def _meta(run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any]
         "sim_s": float(result["time"]),
         "wall_s": float(result["wall_s"]),
         "ns_per_step": 1e9 * float(result["wall_s"]) / steps if steps else 0.0,
-        "roles": _roles(prepared, fidelity),
+        "roles": layout.roles,
         "faults": [str(fault) for fault in run.scenario.fault],
         "scenario": run.scenario.to_dict(),
         **_features(prepared, result),
@@ -139,11 +161,3 @@ def _features(prepared: Prepared, result: Mapping[str, Any]) -> dict[str, Any]:
         for name, unit in zip(plan.names, plan.units, strict=True)
     }
     return {"features": values, "feature_units": units}
-
-
-def _roles(prepared: Prepared, fidelity: str) -> dict[str, str]:
-    """Role to recorded signal; of several the last, since a sensor stands behind what it senses."""
-    recorded = {name for plan in prepared.plan for name in plan.signals}
-    known = signal_records(prepared.actuator.wiring, fidelity)
-    played = {name: item.get("role") for name, item in known.items() if name in recorded}
-    return {role: name for name, role in played.items() if role}
