@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from functools import cache
 from html import escape
+from importlib.resources import files
 
 from elevon.errors import unknown
+from elevon.plain import Plain
 
 
 @dataclass(frozen=True)
-class Block:
+class Block(Plain):
     """One box of the signal path.
 
     Attributes
@@ -28,7 +32,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Diagram:
+class Diagram(Plain):
     """A chain of boxes, what enters it from outside, and what is fed back.
 
     Attributes
@@ -49,123 +53,15 @@ class Diagram:
     feedback: tuple[tuple[int, int, str], ...]
 
 
-_ROTARY = Diagram(
-    source="command",
-    blocks=(
-        Block(
-            "Control electronics",
-            ("position P, speed PID", "limits, anti-windup", "control.*"),
-            "current_ref",
-        ),
-        Block(
-            "Power electronics",
-            ("inverse Park, Clarke", "relays or carrier PWM", "inverter.* pwm.*"),
-            "voltage_a, b, c",
-        ),
-        Block(
-            "Motor",
-            ("three-phase star", "R, L, EMF k(theta)", "motor.*"),
-            "motor_torque",
-        ),
-        Block(
-            "Motor shaft",
-            ("inertia, Borello friction", "viscous friction, brake", "friction.*"),
-            "motor_position",
-        ),
-        Block(
-            "Transmission, output",
-            ("gear 1:i, backlash, stops", "spring, inertia", "gear.* backlash.* load.*"),
-            "output_position",
-        ),
-    ),
-    loads=((1, "supply"), (3, "brake, shaft load"), (4, "output load")),
-    feedback=(
-        (2, 1, "current_a, b, c (sensors)"),
-        (3, 0, "motor_speed, motor_position (resolver)"),
-        (4, 0, "output_position / encoder"),
-    ),
-)
-
-_BALLSCREW = Diagram(
-    source="command",
-    blocks=(
-        Block(
-            "Control electronics",
-            ("position P, speed PI", "feed-forward, limits", "control.*"),
-            "current_ref",
-        ),
-        Block(
-            "Power electronics",
-            ("relays or carrier PWM", "sinusoidal or six-step", "inverter.* drive.*"),
-            "voltage_a, b, c",
-        ),
-        Block(
-            "Motor",
-            ("three-phase star", "thermal network", "motor.* thermal.*"),
-            "motor_torque",
-        ),
-        Block(
-            "Screw and nut",
-            ("inertia, friction, spall", "efficiency either way", "friction.* screw.*"),
-            "motor_position",
-        ),
-        Block(
-            "Ram, load side",
-            ("backlash, joint, load mass", "load cell, end stops", "backlash.* load.* stop.*"),
-            "output_position",
-        ),
-    ),
-    loads=((1, "supply"), (4, "ram load, N")),
-    feedback=(
-        (2, 1, "current_a, b, c (sensors)"),
-        (3, 0, "motor_speed, motor_position (resolver)"),
-        (4, 0, "output_position / encoder"),
-    ),
-)
-
-_LANDING_GEAR = Diagram(
-    source="extend, retract, stop, free fall",
-    blocks=(
-        Block(
-            "Control unit",
-            ("state machine, interlocks", "speed PI, rate limit", "control.*"),
-            "voltage demand",
-        ),
-        Block(
-            "Power stage",
-            ("six-step, PWM", "legs HIGH, LOW, ZERO", "inverter.* six_step.*"),
-            "voltage_a, b, c",
-        ),
-        Block(
-            "Motor and brake",
-            ("trapezoidal EMF, Hall", "detent, brake", "motor.* brake.*"),
-            "motor_torque",
-        ),
-        Block(
-            "Gear, roller screw",
-            ("two planetary stages", "release, friction, preload", "gear.* screw.*"),
-            "ram position",
-        ),
-        Block(
-            "Lever, leg, down-lock",
-            ("triangle, varying inertia", "load factor, lock", "lever.* leg.* lock.*"),
-            "output_position",
-        ),
-    ),
-    loads=((1, "supply"), (4, "load factor, rig speed")),
-    feedback=(
-        (2, 1, "hall sensors (commutation)"),
-        (2, 0, "motor_speed"),
-        (4, 0, "proximity switches, lock state"),
-    ),
-)
-
-_DIAGRAMS = {"rotary": _ROTARY, "ballscrew": _BALLSCREW, "landing_gear": _LANDING_GEAR}
+@cache
+def _diagrams() -> dict[str, Diagram]:
+    text = (files("elevon") / "diagrams.toml").read_text("utf-8")
+    return {name: Diagram.from_dict(data) for name, data in tomllib.loads(text).items()}
 
 
 def diagrams() -> list[str]:
     """Return the wirings that have a diagram."""
-    return list(_DIAGRAMS)
+    return list(_diagrams())
 
 
 def diagram_text(wiring: str) -> str:
@@ -220,9 +116,9 @@ def diagram_svg(wiring: str) -> str:
 
 
 def _find(wiring: str) -> Diagram:
-    if wiring not in _DIAGRAMS:
-        raise unknown("diagram", wiring, _DIAGRAMS)
-    return _DIAGRAMS[wiring]
+    if wiring not in _diagrams():
+        raise unknown("diagram", wiring, _diagrams())
+    return _diagrams()[wiring]
 
 
 def _x(index: int) -> float:

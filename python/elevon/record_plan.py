@@ -13,48 +13,21 @@ from elevon.units import parse_quantity
 MOST_STEPS = 9.0e15
 
 #: Named groups of signals; a model without one of them leaves it out of the group.
-GROUPS: Mapping[str, tuple[str, ...]] = {
+_GROUPS = {
     "drive_log": (
-        "encoder_position",
-        "motor_position",
-        "speed_ref",
-        "motor_speed",
-        "current_ref",
-        "current_q_meas",
-        "current_d_meas",
-        "voltage_q_ref",
-        "voltage_q_meas",
+        "encoder_position motor_position speed_ref motor_speed current_ref current_q_meas "
+        "current_d_meas voltage_q_ref voltage_q_meas"
     ),
-    "essential": (
-        "command",
-        "output_position",
-        "motor_torque",
-        "friction_torque",
-        "current_q",
-        "current_d",
-    ),
+    "essential": ("command output_position motor_torque friction_torque current_q current_d"),
     "gear": (
-        "command",
-        "state",
-        "fault_code",
-        "warning_code",
-        "command_refused",
-        "locked",
-        "brake_released",
-        "released",
-        "output_position",
-        "output_speed",
-        "motor_position",
-        "motor_speed",
-        "speed_ref",
-        "voltage_ref",
-        "current_mean",
-        "current_peak",
-        "supply_voltage",
+        "command state fault_code warning_code command_refused locked brake_released "
+        "released output_position output_speed motor_position motor_speed speed_ref "
+        "voltage_ref current_mean current_peak supply_voltage"
     ),
-    "currents": ("current_a", "current_b", "current_c"),
-    "voltages": ("voltage_a", "voltage_b", "voltage_c"),
+    "currents": "current_a current_b current_c",
+    "voltages": "voltage_a voltage_b voltage_c",
 }
+GROUPS = {name: tuple(signals.split()) for name, signals in _GROUPS.items()}
 
 #: What is kept when nothing is given: the rate of the Torino drive's log (T1).
 DEFAULT_RECORD = "drive_log,essential@400 Hz"

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from elevon.data import read_table
 from elevon.errors import RangeError
 
 ZERO_READING = 14.0  # mm: the wheel in full mesh
@@ -23,22 +24,9 @@ INTRINSIC_BACKLASH = math.radians(
 )  # rad at the output: what is left with the wheel in full mesh
 
 #: Micrometer reading [mm] and total backlash [rad] at the output, as measured on the bench.
-MEASURED: tuple[tuple[float, float], ...] = (
-    (14.0, 0.0064),
-    (13.8, 0.0087),
-    (13.5, 0.0094),
-    (13.3, 0.0112),
-    (13.1, 0.0120),
-    (12.8, 0.0143),
-    (12.4, 0.0172),
-    (12.0, 0.0193),
-    (11.5, 0.0227),
-    (11.0, 0.0265),
-    (10.5, 0.0300),
-    (10.0, 0.0348),
-    (9.5, 0.0401),
-    (9.15, 0.0436),
-    (9.0, 0.0457),
+MEASURED = tuple(
+    (float(row["micrometer_mm"]), float(row["total_measured_rad"]))
+    for row in read_table("torino_backlash")
 )
 
 

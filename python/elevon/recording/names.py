@@ -9,29 +9,9 @@ LONGEST_NAME = 31
 """MATLAB's limit for the fields of a version 5 file."""
 
 _FORM = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_MATLAB = frozenset(
-    {
-        "break",
-        "case",
-        "catch",
-        "classdef",
-        "continue",
-        "else",
-        "elseif",
-        "end",
-        "for",
-        "function",
-        "global",
-        "if",
-        "otherwise",
-        "parfor",
-        "persistent",
-        "return",
-        "spmd",
-        "switch",
-        "try",
-        "while",
-    }
+_MATLAB = (
+    "break case catch classdef continue else elseif end for function global if otherwise "
+    "parfor persistent return spmd switch try while"
 )
 _RESERVED = frozenset({"time", "clock", "units", "elevon"})
 
@@ -65,6 +45,6 @@ def check_name(name: str, what: str = "channel") -> str:
         raise InputError(
             f"{what} {name!r}: {len(name)} characters; the limit is {LONGEST_NAME} (MATLAB)"
         )
-    if keyword.iskeyword(name) or name in _MATLAB or name in _RESERVED:
+    if keyword.iskeyword(name) or name in _MATLAB.split() or name in _RESERVED:
         raise InputError(f"{what} {name!r}: the word is reserved")
     return name

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.compare import RATES, filtered
+from elevon.data import read_table
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault, find_record
 from elevon.progress import Progress
@@ -26,61 +27,8 @@ from elevon.scenario import Scenario
 
 Array = npt.NDArray[np.float64]
 
-ROTARY_FAULTS = (
-    "short@motor.phase_a=0.1",
-    "eccentricity_static@motor=0.2",
-    "eccentricity_dynamic@motor=0.2",
-    "stator_rub@motor=1",
-    "resistor_short@motor.phase_a=0.25",
-    "unbalance@motor.rotor=5e-4 kg m2,phase=0",
-    "open_phase@motor.phase_a=1",
-    "open_switch@inverter.a_high=1",
-    "shorted_switch@inverter.a_high=1",
-    "demagnetisation@motor=0.1",
-    "local_demagnetisation@motor=0.3",
-    "phase_short@motor.phases_ab=0.01",
-    "ground_short@motor.phase_a=0.01",
-    "sag@supply=0.5",
-    "connector_open@supply=1",
-    "gain@sensor.current_a=0.1",
-    "offset@sensor.current_a=0.3 A",
-    "stuck@sensor.current_a=1",
-    "dead@sensor.current_a=1",
-    "friction@transmission=0.25",
-    "lubrication@transmission=1",
-    "backlash@transmission=0.3 deg",
-    "bearing@bearing.outer=1 mm",
-    "bearing@bearing.cage=0.05 N m",
-    "tooth_wear@gear=0.3 deg",
-    "chipped_tooth@gear=0.3 deg",
-    "jam@transmission=20 N m",
-    "gain_drift@control.position=-0.2",
-    "gain_drift@control.speed=-0.2",
-    "dropout@sensor.resolver=0.2",
-    "mismatch@sensor.resolver=0.2",
-    "quadrature@sensor.resolver=0.2",
-    "channel_offset@sensor.resolver.sine=0.1",
-    "offset@sensor.resolver=5 deg",
-    "resolver_short@sensor.resolver.sine=0.2",
-    "resolver_open@sensor.resolver.sine=1",
-    "resolver_open@sensor.resolver.excitation=1",
-    "offset@sensor.encoder=1 deg",
-    "gain@sensor.encoder=0.01",
-    "missing_counts@sensor.encoder=0.01",
-    "dark_sectors@sensor.encoder=0.05",
-    "interpolation@sensor.encoder.first=0.1",
-    "interpolation@sensor.encoder.second=0.1",
-    "stuck@sensor.encoder=1",
-    "dead@sensor.encoder=1",
-)
-"""One severity of each line of the catalogue, of the size a diagnosis has to see (ASSUMED).
-
-What is on or off is on; mechanical wear is that of `backlash`; a contact between or from windings
-is 100 ohm, which the drive feeds beside them without tripping; a resolver's winding loses what
-`mismatch` does, and its windings and channels err by as large an angle. A sensor fails that the
-loops of the shipped actuator file do not close over, where the catalogue offers one: a loop around
-a failed sensor runs away, and nothing is left to compare.
-"""
+ROTARY_FAULTS = tuple(row["fault"] for row in read_table("fault_sensitivity"))
+"""One severity of each line of the catalogue (ASSUMED, see the table)."""
 
 RECORD = (
     "command,output_position,encoder_position,motor_position,motor_speed,current_q,voltage_q_meas"

@@ -13,6 +13,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
+from elevon.data import read_table
 from elevon.errors import InputError
 from elevon.faults import FaultRecord, catalogue
 from elevon.progress import Progress
@@ -24,57 +25,8 @@ from elevon.simulate import Run, simulate_batch
 ACTUATORS = ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear")
 RATE = 2000.0
 
-#: Severity shown, by kind, or kind and unit: plainly visible, and short of ruin (ASSUMED: a gallery
-#: shows what to look for, not where a fault begins to be seen). Every other kind, a switch or a
-#: share of time, at its most.
-_SEVERITIES: Mapping[str, float] = {
-    "adapter_gap": 0.5e-3,
-    "bearing m": 2e-5,
-    "bearing N m": 0.05,
-    "bearing_wear": 0.1,
-    "brake_dragging": 0.2,
-    "channel_offset": 0.05,
-    "chipped_tooth m": 1e-4,
-    "chipped_tooth rad": 0.01,
-    "contamination": 0.01,
-    "dark_sectors": 0.2,
-    "demagnetisation": 0.2,
-    "dropout": 0.3,
-    "eccentricity_dynamic": 0.3,
-    "eccentricity_static": 0.3,
-    "efficiency_loss": 0.2,
-    "friction": 1.0,
-    "friction_growth": 500.0,
-    "gain": 0.2,
-    "gain_drift": 0.3,
-    "ground_short": 0.2,
-    "interpolation": 0.2,
-    "jam N": 2000.0,
-    "jam N m": 2.0,
-    "local_demagnetisation": 0.5,
-    "lock_spring_weak": 0.8,
-    "lubrication": 2.0,
-    "lubrication_loss": 0.5,
-    "mismatch": 0.1,
-    "missing_counts": 0.1,
-    "offset A": 0.5,
-    "offset m": 2e-3,
-    "offset rad": 0.3,
-    "phase_short": 0.2,
-    "backlash m": 0.5e-3,
-    "backlash rad": 0.015,
-    "quadrature": 0.1,
-    "resistor_short": 0.2,
-    "return_jam": 1.0,
-    "sag": 0.4,
-    "short": 0.3,
-    "spall": 2e-4,
-    "stator_rub": 0.97,
-    "tooth_wear m": 2e-4,
-    "tooth_wear rad": 0.01,
-    "unbalance": 2e-5,
-    "resolver_short": 0.3,
-}
+#: Severity shown, SI, by kind, or kind and unit; every other kind at its most.
+_SEVERITIES = {row["kind"]: float(row["severity"]) for row in read_table("fault_gallery")}
 #: What a fault needs of its actuator to show at all; the healthy unit beside it has the same.
 _GIVEN: Mapping[str, Mapping[str, str]] = {
     "connector_open": {"inverter.link_capacitance": "470 uF"},

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 import zlib
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.data import read_table
 
 Kind = Literal["factor", "added", "vector", "range"]
 
@@ -62,37 +63,12 @@ AIR = "temperature of air and actuator"
 GREASE_PER_KELVIN = 0.03
 """Share of the grease's viscosity lost per kelvin (ASSUMED: common greases halve in some 23 K)."""
 
-SPREADS = (
-    UnitSpread("dry friction", ("friction.static", "friction.dynamic"), "factor", 0.10,
-               "seals and bearings seat anew with each reassembly"),
-    UnitSpread("preload", ("screw.preload",), "factor", 0.10,
-               "makers hold the torque of a preload to 10 to 30 %"),
-    UnitSpread(FRICTION_COEFFICIENT, (), "factor", 0.05, "grease, finish, run-in of the raceways"),
-    UnitSpread("friction of the load side", ("load.friction",), "factor", 0.10, "guides and seals"),
-    UnitSpread("backlash of the fixture",
-               ("backlash.total",), "factor", 0.20, "pins are fitted anew"),
-    UnitSpread("EMF constant", ("motor.emf_constant",), "factor", 0.01, "magnets of another lot"),
-    UnitSpread("gain of each current sensor",
-               ("sensor.current.gain_a",), "added", 0.005, "adjusted to 0.5 %"),
-    UnitSpread("gain of each current sensor", ("sensor.current.gain_b",), "added", 0.005, ""),
-    UnitSpread("gain of each current sensor", ("sensor.current.gain_c",), "added", 0.005, ""),
-    UnitSpread("offset of each current sensor",
-               ("sensor.current.offset_a",), "added", 0.01, "0.05 % of a 20 A sensor"),
-    UnitSpread("offset of each current sensor", ("sensor.current.offset_b",), "added", 0.01, ""),
-    UnitSpread("offset of each current sensor", ("sensor.current.offset_c",), "added", 0.01, ""),
-    UnitSpread("mismatch of the resolver's channels",
-               ("sensor.resolver.mismatch",), "range", 0.0, "up to 1 mrad, 3.4 arcmin", 0.002),
-    UnitSpread("runout of the rotor", ("motor.eccentricity_dynamic",), "vector", 0.01,
-               "1 % of the gap: 5 um of 0.5 mm"),
-    UnitSpread("bore out of centre", ("motor.eccentricity_static",), "vector", 0.02,
-               "fits of the end shields"),
-    UnitSpread("cogging", ("motor.cogging_torque",), "vector", 0.05,
-               "N m; some 0.4 % of the rated torque, 24 cycles a turn"),
-    UnitSpread("place of the cogging", ("motor.cogging_phase",), "range", 0.0,
-               "the resolver is adjusted anew", 0.2618),
-    UnitSpread("unbalance left", ("motor.unbalance_inertia",), "vector", 1e-5,
-               "0.1 kg cm2, a seventieth of the seeded one"),
-    UnitSpread(AIR, ("thermal.ambient",), "range", 288.15, "15 to 30 degC in a laboratory", 303.15),
+SPREADS = tuple(
+    UnitSpread(
+        row["name"], tuple(row["paths"].split()), cast(Kind, row["kind"]), float(row["size"]),
+        row["reason"], float(row["upper"]),
+    )
+    for row in read_table("nasa_spreads")
 )  # fmt: skip
 """What differs between healthy units, all ASSUMED."""
 
