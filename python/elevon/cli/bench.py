@@ -9,10 +9,12 @@ import typer
 
 from elevon.cli import common, completion, interrupt
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import answer, print_json, print_table, progress_bar
+from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
+    from elevon.bench.run import BenchResult
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -27,24 +29,24 @@ def _bench() -> None:
     """Run the virtual test bench's procedures."""
 
 
-@app.command("list")
-def list_procedures(*, json: common.JsonOption = False) -> None:
+@command(app, name="list")
+def list_procedures() -> Answer:
     """List the procedures that come with the package."""
     from elevon.bench.procedure import load_procedure, procedure_names
 
     procedures = [load_procedure(name) for name in procedure_names()]
-    if json:
-        rows = [
-            {"name": p.name, "text": p.text, "logs": [t.name for t in p.traces]} for p in procedures
-        ]
-        print_json({"procedures": rows})
-        return
-    print_table(
-        ("procedure", "logs", "what for"), [(p.name, len(p.traces), p.text) for p in procedures]
-    )
+    rows = [
+        {"name": p.name, "text": p.text, "logs": [t.name for t in p.traces]} for p in procedures
+    ]
+
+    def show() -> None:
+        cells = [(p.name, len(p.traces), p.text) for p in procedures]
+        print_table(("procedure", "logs", "what for"), cells)
+
+    return Answer({"procedures": rows}, show)
 
 
-@app.command()
+@command(app, "strict")
 def run(
     procedure: Annotated[
         str,
@@ -67,9 +69,7 @@ def run(
         Path | None, typer.Option(metavar="FILE", help="Write the hidden values (JSON).")
     ] = None,
     force: common.ForceOption = False,
-    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
     from elevon.bench.procedure import load_procedure
     from elevon.doors import bench
@@ -95,9 +95,10 @@ def run(
             force=force,
             progress=advance,
         )
-    if json:
-        print_json(result.to_dict(stored=False))
-        return
+    return Answer(result, lambda: _print(result, out))
+
+
+def _print(result: BenchResult, out: Path) -> None:
     rows = [
         (
             log.name,

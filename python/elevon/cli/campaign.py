@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from elevon.cli import campaign_analysis, interrupt
-from elevon.cli.common import JsonOption, StrictOption
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 campaign_analysis.add_to(app)
@@ -31,14 +31,13 @@ ClusterOption = Annotated[
 ]
 
 
-@app.command()
+@command(app)
 def plan(
     plan: PlanArgument,
     *,
     threads: ThreadsOption = None,
     allow_outside: OutsideOption = False,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Check a plan and say what it will take; nothing is written."""
     from elevon.campaign import load_plan, resolve_plan
     from elevon.campaign.check import check
@@ -49,25 +48,25 @@ def plan(
     resolved = resolve_plan(read, document, allow_outside=allow_outside)
     checked = check(resolved)
     need = estimate(resolved, checked, Path(), checked_threads(threads))
-    if json:
-        print_json(
-            {
-                "status": "ok",
-                "name": resolved.name,
-                "runs": len(resolved),
-                "blocks": need.blocks,
-                "estimate": need.to_dict(),
-                "columns": [
-                    {"name": c.name, "kind": c.kind, "unit": c.unit, "role": c.role}
-                    for c in resolved.columns
-                ],
-                "splits": _counted(resolved.index.split),
-                "responses": resolved.responses,
-                "design": resolved.design,
-                "not_acting": checked.idle,
-            }
-        )
-        return 0
+    data = {
+        "status": "ok",
+        "name": resolved.name,
+        "runs": len(resolved),
+        "blocks": need.blocks,
+        "estimate": need.to_dict(),
+        "columns": [
+            {"name": c.name, "kind": c.kind, "unit": c.unit, "role": c.role}
+            for c in resolved.columns
+        ],
+        "splits": _counted(resolved.index.split),
+        "responses": resolved.responses,
+        "design": resolved.design,
+        "not_acting": checked.idle,
+    }
+    return Answer(data, lambda: _print_plan(resolved, need, checked.idle))
+
+
+def _print_plan(resolved: Any, need: Any, idle: Sequence[str]) -> None:
     typer.echo(f"{resolved.name}: {need}")
     rows = [[c.name, c.kind, c.role, c.unit, _range(c)] for c in resolved.columns]
     print_table(["varied", "kind", "role", "unit", "values"], rows)
@@ -75,9 +74,8 @@ def plan(
         typer.echo(line)
     for part, count in _counted(resolved.index.split).items():
         typer.echo(f"split {part}: {count} runs")
-    for text in checked.idle:
+    for text in idle:
         typer.echo(f"has no effect: {text}")
-    return 0
 
 
 def _design_lines(design: dict[str, Any]) -> Iterator[str]:
@@ -98,7 +96,7 @@ def _design_lines(design: dict[str, Any]) -> Iterator[str]:
         yield f"power of {row['term']}: {power}"
 
 
-@app.command()
+@command(app, "strict")
 def run(
     plan: PlanArgument,
     *,
@@ -108,10 +106,8 @@ def run(
     threads: ThreadsOption = None,
     scheduler: SchedulerOption = None,
     cluster: ClusterOption = None,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
     allow_outside: OutsideOption = False,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Run a plan into a folder; an interrupted one goes on where it was."""
     from elevon.campaign import load_plan, resolve_plan, run_campaign
 
@@ -127,18 +123,17 @@ def run(
             progress=advance,
             announce=say,
         )
-    return _reported(result, out, json=json)
+    return _reported(result, out)
 
 
-@app.command()
+@command(app)
 def resume(
     folder: FolderArgument,
     *,
     threads: ThreadsOption = None,
     scheduler: SchedulerOption = None,
     cluster: ClusterOption = None,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Go on with a campaign from its folder; the plan file is not needed."""
     from elevon.campaign import resume_campaign
 
@@ -150,21 +145,18 @@ def resume(
             progress=advance,
             announce=say,
         )
-    return _reported(result, folder, json=json)
+    return _reported(result, folder)
 
 
-@app.command()
-def status(folder: FolderArgument, *, json: JsonOption = False) -> int:
+@command(app)
+def status(folder: FolderArgument) -> Answer:
     """Say how far a campaign is."""
     state = _status(folder)
-    if json:
-        print_json(state)
-    else:
-        typer.echo(
-            f"{state['name']}: {state['status']}, {state['done']} of {state['runs']} runs done, "
-            f"{state['failed']} failed{', a process works on it' if state['active'] else ''}"
-        )
-    return 0
+    line = (
+        f"{state['name']}: {state['status']}, {state['done']} of {state['runs']} runs done, "
+        f"{state['failed']} failed{', a process works on it' if state['active'] else ''}"
+    )
+    return Answer(state, lambda: answer(line))
 
 
 def _status(folder: Path) -> dict[str, Any]:
@@ -216,12 +208,9 @@ def _how_far(out: Path) -> str:
     )
 
 
-def _reported(result: Any, out: Path, *, json: bool) -> int:
-    if json:
-        print_json(_summary(result, out))
-    else:
-        _print(result, out)
-    return 1 if result.failed else 0
+def _reported(result: Any, out: Path) -> Answer:
+    code = 1 if result.failed else 0
+    return Answer(_summary(result, out), lambda: _print(result, out), code)
 
 
 def _summary(result: Any, out: Path) -> dict[str, Any]:

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import ForceOption, JsonOption, check_outputs
-from elevon.cli.output import answer, print_json, print_table, progress_bar
+from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.shell import Answer, command
+
+if TYPE_CHECKING:
+    from elevon.analysis.effects import Effects
 
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
 ResponseOption = Annotated[
     str, typer.Option("--response", metavar="R", help="A feature, or a number of runs.parquet.")
 ]
-ReportOption = Annotated[
-    Path | None, typer.Option("--report", metavar="FILE", help="Report to write (HTML).")
-]
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands to ``elevon campaign``."""
-    app.command()(effects)
-    app.command()(surrogate)
+    command(app, "report", "force")(effects)
+    command(app)(surrogate)
 
 
 def effects(
@@ -30,21 +30,17 @@ def effects(
     *,
     response: ResponseOption,
     level: Annotated[float, typer.Option(help="Confidence of the intervals.")] = 0.95,
-    report: ReportOption = None,
-    force: ForceOption = False,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Say which factors move a response, and by how much: main effects and interactions."""
-    from elevon.analysis.effects_page import EQUAL_REPEATS
     from elevon.doors import effects as run
 
-    check_outputs([report], force=force)
     effects = run(folder, response, level=level)
-    if report is not None:
-        effects.report().save(report, force=force)
-    if json:
-        print_json(effects.to_dict(stored=False))
-        return 0
+    return Answer(effects, lambda: _print_effects(effects), page=effects.report)
+
+
+def _print_effects(effects: Effects) -> None:
+    from elevon.analysis.effects_page import EQUAL_REPEATS
+
     rows = [
         [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)]
         for t in effects.terms
@@ -59,7 +55,6 @@ def effects(
             typer.echo(f"{text}: {', '.join(names)}")
     if effects.equal_repeats:
         typer.echo(EQUAL_REPEATS)
-    return 0
 
 
 def _interval(term: Any) -> str:
@@ -83,8 +78,7 @@ def surrogate(
     budget: Annotated[int | None, typer.Option(min=1, help="Cost in high runs.")] = None,
     splits: Annotated[int, typer.Option(min=2, help="Random splits.")] = 10,
     seed: Annotated[int, typer.Option(min=0, help="Of the splits.")] = 0,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Fit a surrogate of a response, and say how well it predicts runs it has not seen.
 
     With --low: kriging of the high runs against co-kriging of both fidelities at equal cost.
@@ -113,15 +107,16 @@ def surrogate(
             seed=seed,
             progress=advance,
         )
-    if json:
-        print_json(result.to_dict(stored=False))
-        return 0
+    return Answer(result, lambda: _print_surrogate(result))
+
+
+def _print_surrogate(result: Any) -> None:
     rows = [
         [v.name, v.high, v.low, f"{v.mean:.3g}", f"{v.interval[0]:.3g} to {v.interval[1]:.3g}"]
         for v in result.variants
     ]
     answer(result.headline)
-    title = f"{response}: error on held-out high runs over the response's standard deviation"
+    title = f"{result.response}: error on held-out high runs over the response's standard deviation"
     print_table(("surrogate", "high runs", "low runs", "error", "interval"), rows, title=title)
     if result.gain is not None and result.gain_interval is not None:
         first, last = result.gain_interval
@@ -129,7 +124,6 @@ def surrogate(
             f"kriging less co-kriging at equal cost (a high run costs {result.cost_ratio:.3g} low "
             f"ones): {result.gain:.3g}, interval {first:.3g} to {last:.3g}"
         )
-    return 0
 
 
 def _cost_ratio(high: Any, low: Any) -> float:

@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli import completion
-from elevon.cli.common import JsonOption
-from elevon.cli.output import answer, print_json, print_table
+from elevon.cli.output import answer, print_table
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Parameter set or scenario (TOML).")],
     *,
@@ -25,8 +25,7 @@ def check(
             autocompletion=completion.actuators,
         ),
     ] = None,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Report every finding of an actuator file or a scenario file; nothing is simulated."""
     from elevon.documents import read_toml
 
@@ -37,21 +36,21 @@ def check(
     scenario = bool(words) and not top_keys
     rows = _of_scenario(file, actuator) if scenario else _of_set(file)
     failed = any(row["severity"] == "error" for row in rows)
-    if json:
-        print_json(
-            {
-                "status": "fail" if failed else "pass",
-                "file": str(file),
-                "kind": "scenario" if scenario else "set",
-                "findings": rows,
-            }
-        )
-        return 1 if failed else 0
+    data = {
+        "status": "fail" if failed else "pass",
+        "file": str(file),
+        "kind": "scenario" if scenario else "set",
+        "findings": rows,
+    }
+
+    return Answer(data, lambda: _print(file, rows), 1 if failed else 0)
+
+
+def _print(file: Path, rows: list[dict[str, Any]]) -> None:
     errors = sum(row["severity"] == "error" for row in rows)
     answer(f"{file}: {errors} errors, {len(rows) - errors} warnings")
     if rows:
         print_table(("severity", "finding"), [(row["severity"], row["message"]) for row in rows])
-    return 1 if failed else 0
 
 
 def _of_scenario(file: Path, reference: str | None) -> list[dict[str, Any]]:

@@ -16,6 +16,7 @@ from elevon.files import check_output
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
     from elevon.parameters import Parameter
     from elevon.scenario import Scenario
 
@@ -110,6 +111,28 @@ DetailsOption = Annotated[
     typer.Option("--details", callback=show_details, help="Long lists of the answer whole."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+
+LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Drive logs.")]
+LoadcellOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--loadcell",
+        help="Load-cell file; one for each log in order. By default NAME_loadcell.csv beside it.",
+    ),
+]
+CommandOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--command",
+        help="Command note; one for each log, or one for all. By default NAME_command.json.",
+    ),
+]
+MapOption = Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")]
+TransientOption = Annotated[
+    float | None, typer.Option(min=0.0, help="Left out at the beginning of each log [s].")
+]
+ReportOption = Annotated[Path | None, typer.Option("--report", help="HTML page to write.")]
+DateOption = Annotated[str | None, typer.Option(help="Date printed in the report.")]
 
 
 def read_settings(settings: Sequence[str] | None) -> dict[str, str]:
@@ -210,3 +233,44 @@ def without_companions(logs: list[Path]) -> list[Path]:
         if log not in remaining:
             say(f"{log}: read with its log, not as one")
     return remaining
+
+
+def one_each(
+    option: str, given: list[Path] | None, count: int, *, shared: bool = False
+) -> list[Path | None]:
+    """Spread files over logs.
+
+    A single load-cell file of several logs would be a guess, so it is refused; one command note
+    for all is what a bench run repeated gives.
+    """
+    if not given:
+        return [None] * count
+    if shared and len(given) == 1:
+        return [given[0]] * count
+    if len(given) != count:
+        raise InputError(f"{option}: {len(given)} given for {count} logs; one for each, in order")
+    return list(given)
+
+
+def read_logs(
+    logs: Sequence[Path],
+    column_map: Path | None = None,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+) -> list[Log]:
+    """Read logs with what stands beside them; warnings of the import go to stderr."""
+    from elevon.logs.read import read_logs as read_all
+
+    paths = without_companions(list(logs))
+    if not paths:
+        return []
+    read = read_all(
+        paths,
+        column_map,
+        loadcells=one_each("--loadcell", loadcell, len(paths)),
+        notes=one_each("--command", command, len(paths), shared=True),
+    )
+    for log in read:
+        for text in log.warnings:
+            say(f"{log.name}: {text}")
+    return read

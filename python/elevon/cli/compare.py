@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli import common
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict")
 def compare(
     actuator: common.ActuatorArgument,
     *,
@@ -39,12 +40,10 @@ def compare(
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
     ] = False,
     seed: common.SeedOption = 0,
-    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: common.JsonOption = False,
     out: Annotated[Path | None, typer.Option(help="Folder for report.html.")] = None,
     force: common.ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
-) -> int:
+) -> Answer:
     """Run one scenario at high and at low fidelity; default: the one that the set says."""
     from elevon.compare import default_scenario, default_start
     from elevon.doors import compare as run
@@ -62,7 +61,7 @@ def compare(
     run_scenario = run_scenario.with_faults(fault or [])
     start = default_start(model, run_scenario, default=by_default) if after is None else after
     if faults_table:
-        return _faults_table(model, run_scenario, start, seed, json)
+        return _faults_table(model, run_scenario, start, seed)
     with progress_bar("comparing") as advance:
         result = run(
             model, run_scenario, loads=loads, load=load, seed=seed, start=start, cutoff=cutoff,
@@ -73,15 +72,11 @@ def compare(
         from elevon.reproduce.compare_page import compare_report
 
         say(f"report: {compare_report(result, actuator, date=date).save(page, force=force)}")
-    if json:
-        print_json(values)
-    else:
-        answer(result.headline)
-        _print(values)
-    return 0
+    return Answer(values, lambda: _print(result.headline, values))
 
 
-def _print(values: dict[str, Any]) -> None:
+def _print(headline: str, values: dict[str, Any]) -> None:
+    answer(headline)
     runs = values["loads"] or {"": values}
     rows = [
         [
@@ -103,23 +98,21 @@ def _print(values: dict[str, Any]) -> None:
     answer(f"after {values['start_s']:g} s; {values['filter']}")
 
 
-def _faults_table(
-    model: Actuator, run_scenario: Scenario, after: float, seed: int, as_json: bool
-) -> int:
+def _faults_table(model: Actuator, run_scenario: Scenario, after: float, seed: int) -> Answer:
     from elevon.reproduce.fault_sensitivity import fault_sensitivity
 
     with progress_bar("healthy and faulty runs") as advance:
         rows = fault_sensitivity(model, run_scenario, start=after, seed=seed, progress=advance)
     values = {"actuator": model.name, "rows": [row.to_dict() for row in rows]}
-    if as_json:
-        print_json(values)
-        return 0
-    both = sum(row.verdict == "seen by both" for row in rows)
-    answer(f"{model.name}: {both} of {len(rows)} faults are seen by both models")
-    table = [
-        [row.fault, row.feature, f"{row.high:+.4g}", f"{row.low:+.4g}", f"{row.floor:.2g}",
-         f"{row.ratio:+.2f}", row.verdict]
-        for row in rows
-    ]  # fmt: skip
-    print_table(["fault", "seen in", "high", "low", "floor", "low/high", ""], table)
-    return 0
+
+    def show() -> None:
+        both = sum(row.verdict == "seen by both" for row in rows)
+        answer(f"{model.name}: {both} of {len(rows)} faults are seen by both models")
+        table = [
+            [row.fault, row.feature, f"{row.high:+.4g}", f"{row.low:+.4g}", f"{row.floor:.2g}",
+             f"{row.ratio:+.2f}", row.verdict]
+            for row in rows
+        ]  # fmt: skip
+        print_table(["fault", "seen in", "high", "low", "floor", "low/high", ""], table)
+
+    return Answer(values, show)

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli import dataset_make
-from elevon.cli.common import ForceOption, JsonOption
+from elevon.cli.common import ForceOption
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 dataset_make.add_to(app)
@@ -18,16 +19,17 @@ dataset_make.add_to(app)
 FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
 
 
-@app.command()
-def describe(folder: FolderArgument, *, json: JsonOption = False) -> int:
+@command(app)
+def describe(folder: FolderArgument) -> Answer:
     """Say what is in a data set: runs, faults, distributions, columns."""
     from elevon.campaign import load_campaign
     from elevon.campaign.describe import describe as described
 
     about = described(load_campaign(folder))
-    if json:
-        print_json(about)
-        return 0
+    return Answer(about, lambda: _print_about(about))
+
+
+def _print_about(about: dict[str, Any]) -> None:
     typer.echo(f"{about['name']}: {about['actuator']}, {about['fidelity']} fidelity")
     typer.echo(f"{about['runs']} runs ({_counts(about['statuses'])}), {about['bytes']} bytes")
     if about["splits"]:
@@ -38,35 +40,33 @@ def describe(folder: FolderArgument, *, json: JsonOption = False) -> int:
     print_table(["varied", "unit", "role", "smallest", "largest"], rows)
     for text in about["not_acting"]:
         typer.echo(f"has no effect: {text}")
-    return 0
 
 
-@app.command()
-def verify(folder: FolderArgument, *, json: JsonOption = False) -> int:
+@command(app)
+def verify(folder: FolderArgument) -> Answer:
     """Check that every file is as written, every run there once, and nothing leaks: exit 0 or 1."""
     from elevon.campaign.verify import verify as verified
-    from elevon.report import all_passed
+    from elevon.report import all_passed, verdict
 
     with progress_bar("verifying") as advance:
         checks = verified(folder, advance)
     passed = all_passed(checks)
-    if json:
-        status = "pass" if passed else "fail"
-        print_json({"status": status, "checks": [check.to_dict() for check in checks]})
-    else:
+
+    def show() -> None:
         wrong = sum(not c.passed for c in checks)
         answer(f"{folder}: {f'{wrong} of {len(checks)} checks fail' if wrong else 'whole'}")
         rows = [["pass" if c.passed else "FAIL", f"{c.value:.0f}", c.name] for c in checks]
         print_table(["", "count", "what is wrong"], rows)
+
     if not passed:
         say(
             f"elevon dataset repair {folder} rebuilds what it can prove; elevon campaign resume "
             f"{folder} simulates lost blocks again"
         )
-    return 0 if passed else 1
+    return Answer(verdict(checks), show, 0 if passed else 1)
 
 
-@app.command()
+@command(app)
 def export(
     folder: FolderArgument,
     *,
@@ -76,8 +76,7 @@ def export(
         str | None, typer.Option(metavar="LIST", help="Such as 0-99,250; default all.")
     ] = None,
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Write one file a run and a table of the runs, for MATLAB and other programs."""
     from elevon.campaign import load_campaign
     from elevon.campaign.export import export as exported
@@ -87,21 +86,16 @@ def export(
     numbers = None if runs is None else run_numbers(runs, len(ds))
     with progress_bar("writing") as advance:
         files = exported(ds, out.expanduser(), form, numbers, force=force, progress=advance)
-    if json:
-        print_json(
-            {
-                "status": "ok",
-                "runs": len(ds) if numbers is None else len(numbers),
-                "files": files,
-                "out": out,
-            }
-        )
-    else:
-        typer.echo(f"{len(files)} files in {out}")
-    return 0
+    data = {
+        "status": "ok",
+        "runs": len(ds) if numbers is None else len(numbers),
+        "files": files,
+        "out": out,
+    }
+    return Answer(data, lambda: answer(f"{len(files)} files in {out}"))
 
 
-@app.command()
+@command(app)
 def split(
     folder: FolderArgument,
     *,
@@ -112,30 +106,26 @@ def split(
         str | None, typer.Option(help="unit or draw; default unit where there are units.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the dealing.")] = 0,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Deal whole units or draws to parts anew; the samples stay as they are."""
     from elevon.campaign.resplit import resplit
 
     counts = resplit(folder, _shares(share), by=by, seed=seed)
-    if json:
-        print_json({"status": "ok", "splits": counts, "out": folder})
-    else:
-        typer.echo(_counts(counts))
-    return 0
+    return Answer(
+        {"status": "ok", "splits": counts, "out": folder}, lambda: answer(_counts(counts))
+    )
 
 
-@app.command()
-def repair(folder: FolderArgument, *, json: JsonOption = False) -> int:
+@command(app)
+def repair(folder: FolderArgument) -> Answer:
     """Rebuild damaged manifest, plans, table and log from what is whole; simulates nothing."""
     from elevon.campaign.repair import repair as repaired
 
     done = repaired(folder.expanduser())
-    if json:
-        print_json({"status": "ok", "done": done, "out": folder})
-    else:
-        typer.echo("\n".join(done) if done else "nothing is damaged")
-    return 0
+    return Answer(
+        {"status": "ok", "done": done, "out": folder},
+        lambda: answer("\n".join(done) if done else "nothing is damaged"),
+    )
 
 
 def _shares(texts: list[str]) -> dict[str, float]:

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from elevon.cli.common import JsonOption
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table, progress_bar
+from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 
 _make = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
 
@@ -17,7 +17,7 @@ _make = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup
 def add_to(app: typer.Typer) -> None:
     """Add the commands to ``elevon dataset``."""
     app.add_typer(_make, name="make", help="Make a documented data set.")
-    app.command()(score)
+    command(app)(score)
 
 
 @_make.callback()
@@ -25,7 +25,7 @@ def make() -> None:
     """Make a documented data set."""
 
 
-@_make.command()
+@command(_make)
 def benchmark(
     *,
     out: Annotated[
@@ -39,8 +39,7 @@ def benchmark(
     seed: Annotated[int, typer.Option(min=0, help="Of everything drawn.")] = 0,
     threads: Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")] = None,
     scores: Annotated[bool, typer.Option(help="Compute the baseline scores too.")] = True,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Make the benchmark set: three actuators, faults that grow, a bench that does not match."""
     from elevon.benchmark import make_benchmark, score_benchmark
 
@@ -53,36 +52,27 @@ def benchmark(
         with progress_bar("baseline scores") as advance:
             rows = [vars(row) for row in score_benchmark(out, progress=advance)]
     total = sum(item["runs"] for item in made.about["campaigns"])
-    if json:
-        status = "failed" if made.failed else "ok"
-        print_json(
-            {"status": status, "runs": total, "failed": made.failed, **made.about, "scores": rows}
-        )
-    else:
-        typer.echo(f"{total} runs in {out}, {made.failed} failed")
-        _print(rows)
-    return 1 if made.failed else 0
+    status = "failed" if made.failed else "ok"
+    data = {"status": status, "runs": total, "failed": made.failed, **made.about, "scores": rows}
+    line = f"{total} runs in {out}, {made.failed} failed"
+    return Answer(data, lambda: _print(rows, line), 1 if made.failed else 0)
 
 
 def score(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A benchmark set.")],
     *,
     seed: Annotated[int, typer.Option(min=0, help="Of the forests.")] = 0,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Score the baseline on a benchmark set: a random forest on the features, nothing tuned."""
     from elevon.benchmark import score_benchmark
 
     with progress_bar("baseline scores") as advance:
         rows = [vars(row) for row in score_benchmark(folder, seed=seed, progress=advance)]
-    if json:
-        print_json({"status": "ok", "scores": rows})
-    else:
-        _print(rows)
-    return 0
+    return Answer({"status": "ok", "scores": rows}, lambda: _print(rows))
 
 
-def _print(rows: list[dict[str, Any]]) -> None:
+def _print(rows: list[dict[str, Any]], *lines: str) -> None:
+    answer(*lines)
     if not rows:
         return
     cells = [

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli import interrupt
-from elevon.cli.common import ForceOption, JsonOption, SeedOption
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.common import ForceOption, SeedOption
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.demo.life.results import LifeDemo
@@ -21,7 +22,7 @@ _PARTS = ("life", "bench")
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def demo(
     *,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for reports and logs.")] = Path(
@@ -37,8 +38,7 @@ def demo(
     ] = "life",
     seed: SeedOption = 0,
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Let a unit live and predict its end from bench logs; one page tells the story.
 
     Interrupted, it goes on where it was when the same command is given again.
@@ -49,16 +49,13 @@ def demo(
     if which not in _PARTS:
         raise unknown("part", which, _PARTS, "--part")
     if which == "bench":
-        return _bench(out, seed, force=force, as_json=json)
+        return _bench(out, seed, force=force)
     from elevon.demo.life.run import run_life
 
     with interrupt.telling(lambda: _story(out)), progress_bar("demo") as advance:
         result = run_life(out, seed=seed, force=force, progress=advance)
-    if json:
-        print_json(result.to_dict())
-    else:
-        _print_life(result)
-    return 0 if all_passed(result.checks) else 1
+    code = 0 if all_passed(result.checks) else 1
+    return Answer(result.to_dict(), lambda: _print_life(result), code)
 
 
 def _print_life(result: LifeDemo) -> None:
@@ -77,7 +74,7 @@ def _print_life(result: LifeDemo) -> None:
     say(f"report: {result.folder / 'report.html'}")
 
 
-def _bench(out: Path, seed: int, *, force: bool, as_json: bool) -> int:
+def _bench(out: Path, seed: int, *, force: bool) -> Answer:
     """Recompute a published table, then find a bench's hidden values from its logs.
 
     Interrupted, it goes on where it was when the same command is given again.
@@ -87,11 +84,8 @@ def _bench(out: Path, seed: int, *, force: bool, as_json: bool) -> int:
 
     with interrupt.telling(lambda: _story(out)), progress_bar("demo") as advance:
         result = run_demo(out, seed=seed, force=force, progress=advance)
-    if as_json:
-        print_json(result.to_dict())
-    else:
-        _print(result)
-    return 0 if all_passed(result.checks) else 1
+    code = 0 if all_passed(result.checks) else 1
+    return Answer(result.to_dict(), lambda: _print(result), code)
 
 
 def _story(out: Path) -> str:

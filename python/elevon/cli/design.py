@@ -7,7 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import answer, print_json, print_table
+from elevon.cli.output import answer, print_table
+from elevon.cli.shell import Answer, command
 from elevon.units import parse_quantity
 
 app = typer.Typer(
@@ -23,7 +24,7 @@ def _design() -> None:
     """Design experiments and parts."""
 
 
-@app.command()
+@command(app)
 def spring(
     *,
     wire: Annotated[str, typer.Option(help="Wire diameter.")] = "3 mm",
@@ -37,8 +38,7 @@ def spring(
     safety: Annotated[str, typer.Option(help="Safety factor.")] = "2",
     longest: Annotated[str, typer.Option(help="Greatest free length of other designs.")] = "1.1 m",
     mover: Annotated[str, typer.Option(help="Displacement of the mover.")] = "10 mm",
-    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
-) -> int:
+) -> Answer:
     """Size the load module's springs: stress check, stiffness, other designs that do as well."""
     from elevon.bench.spring import SpringTask, design_spring, search_springs
 
@@ -64,11 +64,8 @@ def spring(
         "design": {**_row(chosen), "radial_force_N": chosen.radial_force(dx)},
         "feasible": [_row(design) for design in others],
     }
-    if json:
-        print_json(result)
-    else:
-        _show(chosen, others, dx)
-    return 0 if chosen.feasible else 1
+    code = 0 if chosen.feasible else 1
+    return Answer(result, lambda: _show(chosen, others, dx), code)
 
 
 def _checks(design: Any) -> list[dict[str, Any]]:

@@ -7,24 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.calibrate import (
-    CommandOption,
-    LoadcellOption,
-    LogsArgument,
-    MapOption,
-    read,
-)
-from elevon.cli.common import (
-    ActuatorOption,
-    DetailsOption,
-    ForceOption,
-    JsonOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import answer, listed, print_json, print_table, say
+from elevon.cli import common
+from elevon.cli.output import answer, listed, print_table
+from elevon.cli.shell import Answer, command
 from elevon.errors import InputError
 from elevon.number_text import severity_texts
 
@@ -34,14 +19,14 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict", "details", "report", "force")
 def diagnose(
-    logs: LogsArgument,
+    logs: common.LogsArgument,
     *,
-    actuator: ActuatorOption,
-    loadcell: LoadcellOption = None,
-    command: CommandOption = None,
-    column_map: MapOption = None,
+    actuator: common.ActuatorOption,
+    loadcell: common.LoadcellOption = None,
+    command: common.CommandOption = None,
+    column_map: common.MapOption = None,
     baseline: Annotated[
         list[Path] | None,
         typer.Option("--baseline", metavar="LOG", help="Log of the healthy unit; repeatable."),
@@ -60,31 +45,20 @@ def diagnose(
     false_alarm: Annotated[
         float, typer.Option("--false-alarm", help="Rate of healthy logs called faulty.")
     ] = 0.05,
-    settings: SetOption = None,
-    report: Annotated[Path | None, typer.Option("--report", help="HTML page to write.")] = None,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
-    force: ForceOption = False,
-) -> int:
+    settings: common.SetOption = None,
+) -> Answer:
     """Diagnose the unit that wrote the logs, all in one condition."""
     from elevon.diagnose.door import diagnose as run
 
-    check_outputs([report], force=force)
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"--false-alarm {false_alarm:g}: must be between 0 and 1")
-    model = read_actuator(actuator, settings)
+    model = common.read_actuator(actuator, settings)
     result = run(
-        read(logs, column_map, loadcell, command), model, read(baseline or [], column_map),
-        method=method, surrogate=surrogate, faults=fault, false_alarm=false_alarm,
+        common.read_logs(logs, column_map, loadcell, command), model,
+        common.read_logs(baseline or [], column_map), method=method,
+        surrogate=surrogate, faults=fault, false_alarm=false_alarm,
     )  # fmt: skip
-    if report is not None:
-        say(f"report: {result.report().save(report, force=force)}")
-    if json:
-        print_json(result.to_dict(stored=False))
-    else:
-        _print(result)
-    return 0
+    return Answer(result, lambda: _print(result), page=result.report)
 
 
 def _print(result: Diagnosis) -> None:

@@ -7,13 +7,14 @@ from typing import Annotated, Any
 
 import typer
 
-from elevon.cli.common import ForceOption, JsonOption, SeedOption, check_outputs, read_actuator
-from elevon.cli.output import answer, print_json, print_table, progress_bar
+from elevon.cli.common import ForceOption, SeedOption, check_outputs, read_actuator
+from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def diagnose_train(
     *,
     actuator: Annotated[
@@ -33,8 +34,7 @@ def diagnose_train(
     ] = None,
     seed: SeedOption = 0,
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> None:
+) -> Answer:
     """Simulate drawn units on the bench's tests, train, and write the surrogate."""
     from elevon.training.training import trained
 
@@ -52,14 +52,13 @@ def diagnose_train(
         )
     path = result.save(out, force=force)
     size = path.stat().st_size
-    if json:
-        print_json({"file": str(path), "bytes": size, **result.report})
-        return
-    answer(f"trained: {path}, {size / 1000:.0f} kB")
-    _print(result.report)
+    data = {"file": str(path), "bytes": size, **result.report}
+    head = f"trained: {path}, {size / 1000:.0f} kB"
+    return Answer(data, lambda: _print(head, result.report))
 
 
-def _print(report: Any) -> None:
+def _print(head: str, report: Any) -> None:
+    answer(head)
     rows = [
         (
             name,

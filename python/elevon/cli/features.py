@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from elevon.cli.common import JsonOption
-from elevon.cli.output import answer, print_json, print_table, say
+from elevon.cli.output import answer, print_table, say
+from elevon.cli.shell import Answer, command
 from elevon.number_text import quantity_text
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def features(
     log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording, or a log to import.")],
     *,
@@ -29,8 +29,7 @@ def features(
         float | None, typer.Option(help="Of the motor: for features per electrical turn.")
     ] = None,
     clock: Annotated[str | None, typer.Option(help="Clock whose channels serve.")] = None,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Compute features of a log, by the code that computes them while simulating."""
     from elevon.features import recording_features
     from elevon.logs.importing import import_log
@@ -46,16 +45,17 @@ def features(
         {"name": name, "value": value, "unit": result.units[name]}
         for name, value in result.values.items()
     ]
-    if json:
-        print_json({"features": rows, "signals": result.signals, "rate_hz": result.rate})
-        return 0
-    cells = [
-        (name, *quantity_text(value, result.units[name], 6))
-        for name, value in result.values.items()
-    ]
-    answer(f"{log}: {len(cells)} features at {result.rate:g} Hz")
-    print_table(("feature", "value", "unit"), cells)
-    return 0
+
+    def show() -> None:
+        cells = [
+            (name, *quantity_text(value, result.units[name], 6))
+            for name, value in result.values.items()
+        ]
+        answer(f"{log}: {len(cells)} features at {result.rate:g} Hz")
+        print_table(("feature", "value", "unit"), cells)
+
+    data = {"features": rows, "signals": result.signals, "rate_hz": result.rate}
+    return Answer(data, show)
 
 
 def _roles(given: list[str] | None) -> dict[str, str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from elevon.cli import common
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict", "report", "date")
 def fit_low(
     actuator: common.ActuatorArgument,
     *,
@@ -29,33 +31,23 @@ def fit_low(
     ] = None,
     fault: common.FaultOption = None,
     out: Annotated[Path | None, typer.Option(metavar="SET.toml", help="Write the set.")] = None,
-    report: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a report.")] = None,
     seed: common.SeedOption = 0,
-    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: common.JsonOption = False,
     force: common.ForceOption = False,
-    date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
-) -> int:
+) -> Answer:
     """Fit the reduced-order model's free numbers to the switching model over scenarios, faults."""
     from elevon.lowfit import fit_low as run
     from elevon.lowfit import write_fit
+    from elevon.reproduce.lowfit_page import lowfit_report
 
-    common.check_outputs([out, report], force=force)
+    common.check_outputs([out], force=force)
     model = common.read_actuator(actuator, settings)
     cases = _cases(model, scenario, fault)
     with progress_bar("switching model, then the fit") as advance:
         fit = run(model, cases, seed=seed, progress=advance)
     if out is not None:
         say(f"set: {write_fit(out, fit, force=force)}")
-    if report is not None:
-        from elevon.reproduce.lowfit_page import lowfit_report
-
-        say(f"report: {lowfit_report(fit, actuator, date=date).save(report, force=force)}")
-    if json:
-        print_json(fit.to_dict() | {"out": None if out is None else str(out)})
-    else:
-        _print(fit)
-    return 0
+    data = fit.to_dict() | {"out": None if out is None else str(out)}
+    return Answer(data, lambda: _print(fit), page=partial(lowfit_report, fit, actuator))
 
 
 def _cases(model: Actuator, files: list[Path] | None, faults: list[str] | None) -> list[FitCase]:

@@ -7,18 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorOption,
-    DetailsOption,
-    ForceOption,
-    JsonOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import answer, listed, print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, listed, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.prognose.fleet import FleetPlan
@@ -27,42 +18,30 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict", "details", "report", "force")
 def fleet(
     histories: Annotated[
         list[Path], typer.Argument(metavar="HISTORY...", help="One folder a unit, of diagnoses.")
     ],
     *,
-    actuator: ActuatorOption,
+    actuator: common.ActuatorOption,
     mission: Annotated[Path, typer.Option("--mission", metavar="FILE", help="Mission (TOML).")],
     early: Annotated[float, typer.Option(help="Cost of one unit of use thrown away.")] = 1.0,
     late: Annotated[float, typer.Option(help="Cost of a failure in service.")] = 10_000.0,
     visit: Annotated[float, typer.Option(help="Cost of a visit, for all units at it.")] = 500.0,
-    settings: SetOption = None,
-    report: Annotated[Path | None, typer.Option("--report", help="HTML page to write.")] = None,
-    seed: SeedOption = 0,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
-    force: ForceOption = False,
-) -> int:
+    settings: common.SetOption = None,
+    seed: common.SeedOption = 0,
+) -> Answer:
     """Predict several units of one type and group their maintenance."""
     from elevon.prognose.door import fleet as run
 
-    check_outputs([report], force=force)
-    model = read_actuator(actuator, settings)
+    model = common.read_actuator(actuator, settings)
     with progress_bar("model runs") as advance:
         plan = run(
             histories, model, mission, early=early, late=late, visit=visit, seed=seed,
             progress=advance,
         )  # fmt: skip
-    if report is not None:
-        say(f"report: {_page(plan, visit).save(report, force=force)}")
-    if json:
-        print_json(plan.to_dict(stored=False))
-    else:
-        _print(plan)
-    return 0
+    return Answer(plan, lambda: _print(plan), page=lambda: _page(plan, visit))
 
 
 _COLUMNS = ("unit", "remain", "90 %", "alone at", "visit at", "failed before")

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import without_companions
-from elevon.cli.output import answer, print_json, print_table, say
+from elevon.cli import common
+from elevon.cli.output import answer, print_table, say
+from elevon.cli.shell import Answer, command
 from elevon.errors import InputError
 from elevon.units import shown_unit, to_display
 
@@ -21,7 +22,7 @@ app = typer.Typer(
 )
 
 
-@app.command()
+@command(app)
 def import_(
     *,
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Log files.")],
@@ -59,9 +60,8 @@ def import_(
     sidecars: Annotated[
         bool, typer.Option(help="Look for NAME_loadcell.csv and NAME_command.json beside a log.")
     ] = True,
-    json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
-) -> int:
+    force: common.ForceOption = False,
+) -> Answer:
     """Read logs into recordings, and say everything that was seen on the way."""
     from elevon.errors import unknown
     from elevon.logs.formats.detect import FORMATS
@@ -69,14 +69,14 @@ def import_(
     if log_format not in FORMATS:
         raise unknown("format", log_format, FORMATS, "--format")
     if guess is not None:
-        return _guess(logs, guess, out, log_format=log_format, force=force, json=json)
+        return _guess(logs, guess, out, log_format=log_format, force=force)
     if out is None:
         raise InputError("--out is missing: a recording to write; or --guess, a first column map")
     if log_format == "cranfield":
-        return _cranfield(logs, out, force=force, json=json)
-    logs = without_companions(logs) if sidecars else logs
-    cells = _one_each("--loadcell", loadcell, len(logs))
-    notes = _one_each("--command", command, len(logs), shared=True)
+        return _cranfield(logs, out, force=force)
+    logs = common.without_companions(logs) if sidecars else logs
+    cells = common.one_each("--loadcell", loadcell, len(logs))
+    notes = common.one_each("--command", command, len(logs), shared=True)
     targets = _targets(logs, out)
     _check_targets(targets, force=force)
     imported = _read_all(
@@ -85,17 +85,17 @@ def import_(
     )  # fmt: skip
     for log, target in zip(imported, targets, strict=True):
         log.recording.save(target, force=force)
-    if json:
-        print_json(_result(imported, targets))
-    else:
+
+    def show() -> None:
         for log, target in zip(imported, targets, strict=True):
             _show(log.report, target)
-    return 0
+
+    return Answer(_result(imported, targets), show)
 
 
 def _guess(
-    logs: list[Path], target: Path, out: Path | None, *, log_format: str, force: bool, json: bool
-) -> int:
+    logs: list[Path], target: Path, out: Path | None, *, log_format: str, force: bool
+) -> Answer:
     """Write a first column map, and say why every column is what it is."""
     from elevon.files import check_output, write_text
     from elevon.logs.formats.detect import read_table
@@ -107,21 +107,20 @@ def _guess(
     check_output(target, force=force)
     guess = guess_map(read_table(logs[0], log_format))
     write_text(target, guess_text(guess), force=force)
-    if json:
-        print_json(
-            {
-                "status": "ok",
-                "log": str(logs[0]),
-                "map": str(target),
-                "gear_ratio": guess.gear_ratio,
-                "travel_per_turn_m": guess.travel_per_turn,
-                "columns": [item.to_dict() for item in guess.columns],
-            }
-        )
-    else:
+    data = {
+        "status": "ok",
+        "log": str(logs[0]),
+        "map": str(target),
+        "gear_ratio": guess.gear_ratio,
+        "travel_per_turn_m": guess.travel_per_turn,
+        "columns": [item.to_dict() for item in guess.columns],
+    }
+
+    def show() -> None:
         rows = [(c.name, c.role or "?", c.unit, "; ".join(c.reasons)) for c in guess.columns]
         print_table(("column", "role", "unit", "why"), rows, title=f"{logs[0]} -> {target}")
-    return 0
+
+    return Answer(data, show)
 
 
 def _read_all(
@@ -141,18 +140,6 @@ def _read_all(
         imported.append(log)
     same_rate(imported)
     return imported
-
-
-def _one_each(
-    option: str, given: list[Path] | None, count: int, *, shared: bool = False
-) -> list[Path | None]:
-    if not given:
-        return [None] * count
-    if shared and len(given) == 1:
-        return [given[0]] * count
-    if len(given) != count:
-        raise InputError(f"{option}: {len(given)} given for {count} logs; one for each, in order")
-    return list(given)
 
 
 def _targets(logs: list[Path], out: Path) -> list[Path]:
@@ -218,7 +205,7 @@ def _number(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _cranfield(logs: list[Path], out: Path, *, force: bool, json: bool) -> int:
+def _cranfield(logs: list[Path], out: Path, *, force: bool) -> Answer:
     from elevon.logs.formats.cranfield import read_cranfield
 
     if out.suffix.lower() in {".parquet", ".nc", ".mat", ".csv"}:
@@ -232,10 +219,10 @@ def _cranfield(logs: list[Path], out: Path, *, force: bool, json: bool) -> int:
             recording.save(target, force=force)
             rows.append({"recording": str(target), "samples": len(recording.clock()),
                          "labels": recording.labels, **meta})  # fmt: skip
-    if json:
-        print_json({"status": "ok", "logs": rows})
-    else:
+
+    def show() -> None:
         cells = [(r["recording"], r["samples"], r["load_kgf"], r["run"]) for r in rows]
         answer(f"{len(cells)} recordings in {out}")
         print_table(("recording", "samples", "load kgf", "run"), cells)
-    return 0
+
+    return Answer({"status": "ok", "logs": rows}, show)

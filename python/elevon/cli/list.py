@@ -9,7 +9,8 @@ import typer
 from elevon.cli import common, completion
 from elevon.cli.acting import by_drive, check, chosen
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import print_json, print_table
+from elevon.cli.output import print_table
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.faults import FaultRecord
@@ -22,8 +23,8 @@ app = typer.Typer(
 )
 
 
-@app.command()
-def actuators(*, json: common.JsonOption = False) -> None:
+@command(app)
+def actuators() -> Answer:
     """List the actuators that can be named: the shipped ones and those in ELEVON_ACTUATORS."""
     from elevon.documents import read_toml
     from elevon.parameters.find import set_paths
@@ -32,10 +33,10 @@ def actuators(*, json: common.JsonOption = False) -> None:
     for name, path in sorted(set_paths().items()):
         head = read_toml(path).data
         rows.append({"name": name, "title": head.get("title", ""), "file": str(path)})
-    _print("actuators", rows, json, ("name", "title"))
+    return _answer("actuators", rows, ("name", "title"))
 
 
-@app.command()
+@command(app)
 def procedures(
     *,
     actuator: Annotated[
@@ -46,8 +47,7 @@ def procedures(
             autocompletion=completion.actuators,
         ),
     ] = None,
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """List the virtual bench's procedures, with the stand each is written for."""
     from elevon.actuator import Actuator
     from elevon.bench.procedure import load_procedure, procedure_names
@@ -59,16 +59,15 @@ def procedures(
         {"name": p.name, "stand": p.stand, "text": p.text, "logs": [t.name for t in p.traces]}
         for p in read
     ]
-    _print("procedures", rows, json, ("name", "stand", "text"))
+    return _answer("procedures", rows, ("name", "stand", "text"))
 
 
-@app.command()
+@command(app)
 def signals(
     actuator: common.ActuatorArgument,
     *,
     fidelity: common.FidelityOption = "high",
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """List the signals of an actuator that can be recorded."""
     from elevon import _core
     from elevon.actuator import Actuator
@@ -77,17 +76,16 @@ def signals(
     wiring = Actuator.load(actuator).wiring
     check_fidelity(wiring, fidelity)
     rows = [dict(item) for item in _core.signals(wiring, fidelity)]
-    _print("signals", rows, json, ("name", "unit", "text"))
+    return _answer("signals", rows, ("name", "unit", "text"))
 
 
-@app.command()
+@command(app)
 def parameters(
     actuator: common.ActuatorArgument,
     *,
     fidelity: common.OnlyFidelityOption = None,
     not_modelled: common.NotModelledOption = False,
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """List the parameters an actuator's model has: unit, range, meaning, where each acts."""
     from elevon.actuator import Actuator
     from elevon.parameters import records
@@ -111,10 +109,10 @@ def parameters(
         for record in records(wiring).values()
         if chosen(record, fidelity, not_modelled)
     ]
-    _print("parameters", rows, json, ("path", "unit", "range", "text", "acts"))
+    return _answer("parameters", rows, ("path", "unit", "range", "text", "acts"))
 
 
-@app.command()
+@command(app)
 def faults(
     actuator: Annotated[
         str | None,
@@ -127,8 +125,7 @@ def faults(
     *,
     fidelity: common.OnlyFidelityOption = None,
     not_modelled: common.NotModelledOption = False,
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """List the fault catalogue: kind, places, unit, range, where each acts, effect, source.
 
     With an actuator: only what acts in it, in its own ranges, with the drives under which it acts
@@ -138,7 +135,7 @@ def faults(
     listed = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
     first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
     columns = ("kind", "places", "unit", "range", where, "effect", "source", "not_modelled")
-    _print("faults", listed, json, (*first, *columns))
+    return _answer("faults", listed, (*first, *columns))
 
 
 def _faults(
@@ -173,8 +170,8 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
     }
 
 
-@app.command()
-def waveforms(*, json: common.JsonOption = False) -> None:
+@command(app)
+def waveforms() -> Answer:
     """List the waveforms of commands and loads with their parameters (* = must be given)."""
     from elevon.waveforms import wave_records
 
@@ -189,16 +186,18 @@ def waveforms(*, json: common.JsonOption = False) -> None:
         }
         for record in wave_records().values()
     ]
-    if json:
-        print_json({"waveforms": rows})
-        return
-    table = [
-        (row["kind"], ", ".join(_needed(p) for p in row["parameters"]), row["text"]) for row in rows
-    ]
-    print_table(("kind", "parameters", "text"), table)
+
+    def show() -> None:
+        cells = [
+            (row["kind"], ", ".join(_needed(p) for p in row["parameters"]), row["text"])
+            for row in rows
+        ]
+        print_table(("kind", "parameters", "text"), cells)
+
+    return Answer({"waveforms": rows}, show)
 
 
-@app.command()
+@command(app)
 def features(
     actuator: Annotated[
         str | None,
@@ -210,8 +209,7 @@ def features(
     ] = None,
     *,
     fidelity: common.FidelityOption = "high",
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """List the features of a motion: unit, roles they need, definition.
 
     With an actuator: only those it has, with their units and the signals that serve.
@@ -233,7 +231,7 @@ def features(
             for record in feature_records().values()
         ]
     last = "roles" if actuator is None else "signals"
-    _print("features", rows, json, ("name", "unit", "family", last, "text"))
+    return _answer("features", rows, ("name", "unit", "family", last, "text"))
 
 
 def _own_features(reference: str, fidelity: str) -> list[dict[str, Any]]:
@@ -267,12 +265,11 @@ def _needed(parameter: dict[str, Any]) -> str:
     return f"{parameter['name']}*" if parameter["default"] is None else str(parameter["name"])
 
 
-def _print(what: str, rows: list[dict[str, Any]], json: bool, columns: tuple[str, ...]) -> None:
-    if json:
-        print_json({what: rows})
-        return
+def _answer(what: str, rows: list[dict[str, Any]], columns: tuple[str, ...]) -> Answer:
     cells = [[_cell(row[column]) for column in columns] for row in rows]
-    print_table(columns, cells, optional=("acts", "not_modelled"))
+    return Answer(
+        {what: rows}, lambda: print_table(columns, cells, optional=("acts", "not_modelled"))
+    )
 
 
 def _cell(value: Any) -> str:

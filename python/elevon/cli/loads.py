@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli.common import ActuatorOption, ForceOption, JsonOption
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.common import ActuatorOption, ForceOption
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -22,7 +23,7 @@ app = typer.Typer(
 KINDS = (".csv", ".toml")
 
 
-@app.command()
+@command(app)
 def loads(
     flight: Annotated[
         Path,
@@ -58,8 +59,7 @@ def loads(
     ] = False,
     temperature_offset: Annotated[float, typer.Option(help="K on the standard atmosphere.")] = 0.0,
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> int:
+) -> Answer:
     """Turn a recorded flight into the load of one actuator: a table or a scenario."""
     from elevon.actuator import Actuator
     from elevon.errors import InputError
@@ -87,8 +87,7 @@ def loads(
     linear = _linear(model)
     text = _csv(table, linear) if out.suffix == ".csv" else _scenario(table)
     say(f"{out.suffix[1:]}: {write_text(out, text, force=force)}")
-    _print(table, linear, json)
-    return 0
+    return _answer(table, linear)
 
 
 def _linear(model: Actuator) -> bool:
@@ -182,35 +181,38 @@ def _scenario(table: LoadTable) -> str:
     )
 
 
-def _print(table: LoadTable, linear: bool, json: bool) -> None:
+def _answer(table: LoadTable, linear: bool) -> Answer:
     force, length = ("N", "m") if linear else ("N m", "rad")
     low, high = float(table.load.min()), float(table.load.max())
     left, right = float(table.position.min()), float(table.position.max())
     mach, pressure = float(table.mach.max()), float(table.dynamic_pressure.max())
-    if json:
-        print_json(
-            {
-                "samples": int(table.time.size),
-                "duration_s": float(table.time[-1]),
-                "load": [low, high],
-                "load_unit": force,
-                "position": [left, right],
-                "position_unit": length,
-                "load_scale": table.load_scale,
-                "position_scale": table.position_scale,
-                "mach": mach,
-                "dynamic_pressure_pa": pressure,
-            }
+    data = {
+        "samples": int(table.time.size),
+        "duration_s": float(table.time[-1]),
+        "load": [low, high],
+        "load_unit": force,
+        "position": [left, right],
+        "position_unit": length,
+        "load_scale": table.load_scale,
+        "position_scale": table.position_scale,
+        "mach": mach,
+        "dynamic_pressure_pa": pressure,
+    }
+
+    def show() -> None:
+        answer(f"load {low:.5g} to {high:.5g} {force} over {table.time[-1]:g} s")
+        print_table(
+            ["what", "value"],
+            [
+                ["samples", f"{table.time.size} over {table.time[-1]:g} s"],
+                ["load", f"{low:.5g} to {high:.5g} {force}, scale {table.load_scale:.4g}"],
+                [
+                    "position",
+                    f"{left:.4g} to {right:.4g} {length}, scale {table.position_scale:.4g}",
+                ],
+                ["largest Mach number", f"{mach:.3f}"],
+                ["largest dynamic pressure", f"{pressure / 1e3:.3g} kPa"],
+            ],
         )
-        return
-    answer(f"load {low:.5g} to {high:.5g} {force} over {table.time[-1]:g} s")
-    print_table(
-        ["what", "value"],
-        [
-            ["samples", f"{table.time.size} over {table.time[-1]:g} s"],
-            ["load", f"{low:.5g} to {high:.5g} {force}, scale {table.load_scale:.4g}"],
-            ["position", f"{left:.4g} to {right:.4g} {length}, scale {table.position_scale:.4g}"],
-            ["largest Mach number", f"{mach:.3f}"],
-            ["largest dynamic pressure", f"{pressure / 1e3:.3g} kPa"],
-        ],
-    )
+
+    return Answer(data, show)

@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from elevon.cli.calibrate import CommandOption, LoadcellOption, MapOption, read
-from elevon.cli.common import (
-    ActuatorOption,
-    DetailsOption,
-    JsonOption,
-    SetOption,
-    StrictOption,
-    read_actuator,
-)
+from elevon.cli import common
 from elevon.cli.output import answer, listed, print_json, say
 from elevon.errors import InputError
 from elevon.files import check_output
@@ -40,7 +32,7 @@ def monitor(
         ),
     ],
     *,
-    actuator: ActuatorOption,
+    actuator: common.ActuatorOption,
     baseline: Annotated[
         list[Path],
         typer.Option("--baseline", metavar="LOG", help="Healthy log of that motion; repeatable."),
@@ -70,13 +62,13 @@ def monitor(
             "--state", metavar="FILE", help="Of -: where the stream stands; goes on from there."
         ),
     ] = None,
-    loadcell: LoadcellOption = None,
-    command: CommandOption = None,
-    column_map: MapOption = None,
-    settings: SetOption = None,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
+    loadcell: common.LoadcellOption = None,
+    command: common.CommandOption = None,
+    column_map: common.MapOption = None,
+    settings: common.SetOption = None,
+    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
+    details: common.DetailsOption = False,  # noqa: ARG001 - its callback does the work
+    json: common.JsonOption = False,
 ) -> None:
     """Watch logs window by window, in the order given, each a day of the unit; alarm at a fault."""
     options = WatchOptions(
@@ -86,8 +78,8 @@ def monitor(
         longest=None if longest is None else parse_quantity(longest, "s", "--longest"),
         faults=fault,
     )
-    healthy = read(baseline, column_map)
-    unit = read_actuator(actuator, settings)
+    healthy = common.read_logs(baseline, column_map)
+    unit = common.read_actuator(actuator, settings)
     if Path("-") in logs:
         _check_stream(logs, loadcell, command, json=json)
         watch = _monitor(unit, healthy, options, command)
@@ -97,7 +89,7 @@ def monitor(
         raise InputError("--state: serves a stream; give - as the log")
     from elevon.diagnose.door import monitor as run
 
-    given = read(logs, column_map, loadcell, command)
+    given = common.read_logs(logs, column_map, loadcell, command)
     result = run(given, unit, healthy, **options._asdict())
     if json:
         print_json(result.to_dict(stored=False))

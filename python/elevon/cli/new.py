@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 from elevon.cli import completion
-from elevon.cli.common import ForceOption, JsonOption
-from elevon.cli.output import answer, print_json
+from elevon.cli.common import ForceOption
+from elevon.cli.output import answer
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def new(
     name: Annotated[
         str, typer.Argument(metavar="NAME", help="Of the variant; its file is NAME.toml.")
@@ -27,8 +28,7 @@ def new(
         ),
     ],
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> None:
+) -> Answer:
     """Write NAME.toml, a variant of an actuator: every parameter is there, commented out."""
     from elevon.actuator import Actuator
     from elevon.files import write_text
@@ -37,7 +37,7 @@ def new(
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     text = variant_text(path.stem, Actuator.load(base), base)
     written = write_text(path, text, force=force)
-    if json:
-        print_json({"status": "ok", "file": str(written), "base": base})
-        return
-    answer(f"wrote {written}: change what differs, then: elevon check {written}")
+    data = {"status": "ok", "file": str(written), "base": base}
+    return Answer(
+        data, lambda: answer(f"wrote {written}: change what differs, then: elevon check {written}")
+    )

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.common import ActuatorOption, JsonOption, SetOption, read_actuator
-from elevon.cli.output import answer, print_json, print_table, progress_bar
+from elevon.cli import common
+from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.nexttest import NextTest
@@ -16,27 +17,23 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def next_test(
     *,
-    actuator: ActuatorOption,
+    actuator: common.ActuatorOption,
     so_far: Annotated[
         list[Path] | None,
         typer.Option("--so-far", metavar="RESULT", help="JSON of elevon diagnose; repeatable."),
     ] = None,
-    settings: SetOption = None,
-    json: JsonOption = False,
-) -> None:
+    settings: common.SetOption = None,
+) -> Answer:
     """Propose the bench's test with the largest expected information on what is ambiguous."""
     from elevon.nexttest.door import next_test as choose
 
-    model = read_actuator(actuator, settings)
+    model = common.read_actuator(actuator, settings)
     with progress_bar("weighing tests") as advance:
         result = choose(model, so_far or [], progress=advance)
-    if json:
-        print_json(result.to_dict(stored=False))
-        return
-    _print(result)
+    return Answer(result, lambda: _print(result))
 
 
 def _print(result: NextTest) -> None:

@@ -7,18 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorOption,
-    DetailsOption,
-    ForceOption,
-    JsonOption,
-    SeedOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import answer, listed, print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, listed, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
@@ -26,13 +17,13 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict", "details", "report", "force")
 def predict(
     history: Annotated[
         Path, typer.Argument(metavar="HISTORY", help="Folder of dated diagnoses or logs (JSON).")
     ],
     *,
-    actuator: ActuatorOption,
+    actuator: common.ActuatorOption,
     mission: Annotated[Path, typer.Option("--mission", metavar="FILE", help="Mission (TOML).")],
     survive: Annotated[
         list[float] | None,
@@ -44,31 +35,19 @@ def predict(
     snapshots: Annotated[
         bool, typer.Option("--snapshots", help="Correct the tables by runs at high fidelity.")
     ] = False,
-    settings: SetOption = None,
-    report: Annotated[Path | None, typer.Option("--report", help="HTML page to write.")] = None,
-    seed: SeedOption = 0,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
-    force: ForceOption = False,
-) -> int:
+    settings: common.SetOption = None,
+    seed: common.SeedOption = 0,
+) -> Answer:
     """Predict the remaining useful life of the unit whose inspections are in HISTORY."""
     from elevon.prognose.door import predict as run
 
-    check_outputs([report], force=force)
-    model = read_actuator(actuator, settings)
+    model = common.read_actuator(actuator, settings)
     with progress_bar("model runs") as advance:
         result = run(
             history, model, mission, survive=survive or (), particles=particles,
             snapshots=snapshots, seed=seed, progress=advance,
         )  # fmt: skip
-    if report is not None:
-        say(f"report: {result.report().save(report, force=force)}")
-    if json:
-        print_json(result.to_dict(stored=False))
-        return 0
-    _print(result)
-    return 0
+    return Answer(result, lambda: _print(result), page=result.report)
 
 
 def _print(result: Prognosis) -> None:

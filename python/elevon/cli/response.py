@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli import common
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.response import FrequencyResponse, LoopResponse
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict")
 def response(
     actuator: common.ActuatorArgument,
     *,
@@ -57,16 +58,13 @@ def response(
         Path | None, typer.Option(metavar="FILE", help="Bode plot: .png, .svg or .pdf.")
     ] = None,
     seed: common.SeedOption = 0,
-    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
     force: common.ForceOption = False,
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """Measure gain, phase and coherence from the command to a signal by simulation.
 
     With ``--loop`` the open loop instead: gain, phase and disk margin with intervals.
     """
     from elevon.doors import response as run
-    from elevon.response import LoopResponse
 
     _check_plot(plot, force=force)
     loaded = common.read_actuator(actuator, settings)
@@ -80,15 +78,19 @@ def response(
         )  # fmt: skip
     if plot is not None:
         _save(measured, plot, force=force)
-    if json:
-        data = measured.to_dict(stored=False)
-        print_json({k: v for k, v in data.items() if k not in _OPTIONAL or v is not None})
-        return
+    data = measured.to_dict(stored=False)
+    data = {k: v for k, v in data.items() if k not in _OPTIONAL or v is not None}
+    return Answer(data, lambda: _print(measured))
+
+
+def _print(measured: FrequencyResponse | LoopResponse) -> None:
+    from elevon.response import LoopResponse
+
     answer(measured.headline)
     if isinstance(measured, LoopResponse):
         _print_loop(measured)
     else:
-        _print(measured)
+        _print_points(measured)
 
 
 _OPTIONAL = ("linear", "band")
@@ -138,7 +140,7 @@ def _save(measured: FrequencyResponse | LoopResponse, path: Path, *, force: bool
     say(f"wrote {path}")
 
 
-def _print(measured: FrequencyResponse) -> None:
+def _print_points(measured: FrequencyResponse) -> None:
     model = measured.linear
     data: dict[str, Any] = measured.to_dict()
     columns = ("frequency [Hz]", "gain [dB]", "phase [deg]", "coherence", "gain +- [%]")

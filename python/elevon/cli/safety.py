@@ -3,40 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from elevon.cli.common import (
-    ActuatorArgument,
-    ForceOption,
-    JsonOption,
-    SeedOption,
-    SetOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def safety(
-    actuator: ActuatorArgument,
+    actuator: common.ActuatorArgument,
     *,
     every: Annotated[
         int, typer.Option(min=1, help="Only each so-manieth situation: a short form.")
     ] = 1,
-    settings: SetOption = None,
-    seed: SeedOption = 0,
-    json: JsonOption = False,
+    settings: common.SetOption = None,
+    seed: common.SeedOption = 0,
     out: Annotated[
         Path | None, typer.Option(help="Folder for report.html and result.json.")
     ] = None,
-    force: ForceOption = False,
+    force: common.ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
-) -> int:
+) -> Answer:
     """Run every failure, pairs and triples of them in every situation; list the hazards left."""
     import json as text
 
@@ -45,25 +37,24 @@ def safety(
     from elevon.safety.page import safety_report
 
     pages = [] if out is None else [out / "report.html", out / "result.json"]
-    check_outputs(pages, force=force)
-    model = read_actuator(actuator, settings)
+    common.check_outputs(pages, force=force)
+    model = common.read_actuator(actuator, settings)
     with progress_bar("safety campaign") as advance:
         result = run(model, seed=seed, every=every, progress=advance)
     values = result.to_dict()
     if out is not None:
         say(f"report: {safety_report(result, model, date=date).save(pages[0], force=force)}")
         write_text(pages[1], text.dumps(values, indent=1) + "\n", force=force)
-    if json:
-        print_json(values)
-    else:
-        situations = sum(item["rows"] for item in values["hazards"])
-        answer(
-            f"{values['status'].upper()}: {situations} of {result.runs} situations show a hazard"
-        )
-        print_table(
-            ["hazard", "rows", "listed", "by one failure", "per hour"],
-            [[item["name"], *(str(item[key]) for key in ("rows", "listed", "single")),
-              f"{item['per_hour']:.1e}"] for item in values["hazards"]],
-            title="hazards",
-        )  # fmt: skip
-    return 0 if values["status"] == "pass" else 1
+    code = 0 if values["status"] == "pass" else 1
+    return Answer(values, lambda: _print(values, result.runs), code)
+
+
+def _print(values: dict[str, Any], runs: int) -> None:
+    situations = sum(item["rows"] for item in values["hazards"])
+    answer(f"{values['status'].upper()}: {situations} of {runs} situations show a hazard")
+    print_table(
+        ["hazard", "rows", "listed", "by one failure", "per hour"],
+        [[item["name"], *(str(item[key]) for key in ("rows", "listed", "single")),
+          f"{item['per_hour']:.1e}"] for item in values["hazards"]],
+        title="hazards",
+    )  # fmt: skip

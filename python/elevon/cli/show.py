@@ -9,12 +9,13 @@ import typer
 
 from elevon.cli import common
 from elevon.cli.acting import check, chosen
-from elevon.cli.output import print_json, print_table, say
+from elevon.cli.output import print_table, say
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app)
 def show(
     actuator: common.ActuatorArgument,
     *,
@@ -30,13 +31,12 @@ def show(
     fidelity: common.OnlyFidelityOption = None,
     not_modelled: common.NotModelledOption = False,
     force: common.ForceOption = False,
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """Show an actuator: block diagram, parameters with units, sources, where they act; references.
 
     --fidelity and --not-modelled choose among the parameters.
     """
-    from elevon.diagram import diagram_svg, diagram_text, diagrams
+    from elevon.diagram import diagram_svg
 
     common.check_outputs([svg, schema], force=force)
     loaded = common.read_actuator(actuator, settings)
@@ -49,9 +49,13 @@ def show(
         say(f"wrote {svg}")
     if schema is not None:
         _write_schema(schema, loaded.wiring, force=force)
-    if json:
-        print_json(_as_json(loaded, svg, parameters))
-        return
+    data = _as_json(loaded, svg, parameters)
+    return Answer(data, lambda: _print(loaded, parameters, notes))
+
+
+def _print(loaded: Any, parameters: list[Any], notes: bool) -> None:
+    from elevon.diagram import diagram_text, diagrams
+
     typer.echo(f"{loaded.name}: {loaded.title}\n")
     if loaded.wiring in diagrams():
         typer.echo(diagram_text(loaded.wiring) + "\n")

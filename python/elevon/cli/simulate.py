@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli import common
-from elevon.cli.output import print_json, print_table, progress_bar, say
+from elevon.cli.output import print_table, progress_bar, say
+from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.recording import Recording
@@ -19,7 +20,7 @@ app = typer.Typer(rich_markup_mode=None)
 _PLOTS = (".png", ".svg", ".pdf", ".html")
 
 
-@app.command()
+@command(app, "strict")
 def simulate(
     actuator: common.ActuatorArgument,
     *,
@@ -44,9 +45,7 @@ def simulate(
         bool, typer.Option("--spectra", help="Add spectra of error, current and speed to the plot.")
     ] = False,
     force: common.ForceOption = False,
-    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
-    json: common.JsonOption = False,
-) -> None:
+) -> Answer:
     """Simulate one actuator and keep what it did."""
     from elevon.recording.formats import files_of
     from elevon.simulate import Run
@@ -68,10 +67,10 @@ def simulate(
     if plot is not None:
         recording.plot(path=plot, compare=other, spectra=spectra, force=force)
         say(f"wrote {plot}")
-    if json:
-        print_json(_result(recording, loaded.wiring, out, plot))
-    else:
-        _print_result(recording, loaded.wiring)
+    return Answer(
+        _result(recording, loaded.wiring, out, plot),
+        lambda: _print_result(recording, loaded.wiring),
+    )
 
 
 def _check_files(out: Path | None, plot: Path | None, *, force: bool) -> None:

@@ -2,91 +2,69 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import typer
 
-from elevon.cli.calibrate import (
-    CommandOption,
-    DateOption,
-    FidelityOption,
-    LoadcellOption,
-    LogsArgument,
-    MapOption,
-    ReportOption,
-    TransientOption,
-    read,
-)
-from elevon.cli.common import (
-    ActuatorOption,
-    DetailsOption,
-    ForceOption,
-    JsonOption,
-    SetOption,
-    StrictOption,
-    check_outputs,
-    read_actuator,
-)
-from elevon.cli.output import answer, listed, print_json, print_table, progress_bar, say
+from elevon.cli import common
+from elevon.cli.output import answer, listed, print_table, progress_bar
+from elevon.cli.shell import Answer, command
 from elevon.number_text import quantity_text
+
+if TYPE_CHECKING:
+    from elevon.calibrate.validation import Validation
 
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+@command(app, "strict", "details", "report", "force", "date")
 def validate(
-    logs: LogsArgument,
+    logs: common.LogsArgument,
     *,
-    actuator: ActuatorOption,
-    loadcell: LoadcellOption = None,
-    command: CommandOption = None,
-    column_map: MapOption = None,
-    fidelity: FidelityOption = "low",
-    transient: TransientOption = None,
-    settings: SetOption = None,
-    report: ReportOption = None,
-    strict: StrictOption = False,  # noqa: ARG001 - its callback does the work
-    details: DetailsOption = False,  # noqa: ARG001 - its callback does the work
-    json: JsonOption = False,
-    force: ForceOption = False,
-    date: DateOption = None,
-) -> int:
+    actuator: common.ActuatorOption,
+    loadcell: common.LoadcellOption = None,
+    command: common.CommandOption = None,
+    column_map: common.MapOption = None,
+    fidelity: common.FidelityOption = "low",
+    transient: common.TransientOption = None,
+    settings: common.SetOption = None,
+) -> Answer:
     """Compare the model with logs, signal by signal; exit 1 where a threshold fails."""
     from elevon.calibrate.door import validate as run
 
-    check_outputs([report], force=force)
-    model = read_actuator(actuator, settings)
-    data = read(logs, column_map, loadcell, command)
+    model = common.read_actuator(actuator, settings)
+    data = common.read_logs(logs, column_map, loadcell, command)
     with progress_bar("validating") as advance:
         result = run(data, model, fidelity=fidelity, transient=transient, progress=advance)
         advance(1.0)
-    if report is not None:
-        say(f"report: {result.report(date=date).save(report, force=force)}")
-    if json:
-        print_json(result.to_dict(stored=False))
-    else:
-        answer(result.headline)
-        rows = [
-            (
-                e.log,
-                e.signal,
-                quantity_text(e.rms, e.unit, 4)[0],
-                *quantity_text(e.largest, e.unit, 4),
-                f"{e.of_rms:.3g}",
-                f"{e.of_range:.3g}",
-                "" if e.limit is None else f"{e.limit:.3g}",
-                "" if e.passed is None else "pass" if e.passed else "FAIL",
-            )
-            for e in result.errors
-        ]
-        print_table(
-            ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
+    code = 1 if result.status == "fail" else 0
+    return Answer(result, lambda: _print(result), code, page=result.report)
+
+
+def _print(result: Validation) -> None:
+    answer(result.headline)
+    rows = [
+        (
+            e.log,
+            e.signal,
+            quantity_text(e.rms, e.unit, 4)[0],
+            *quantity_text(e.largest, e.unit, 4),
+            f"{e.of_rms:.3g}",
+            f"{e.of_range:.3g}",
+            "" if e.limit is None else f"{e.limit:.3g}",
+            "" if e.passed is None else "pass" if e.passed else "FAIL",
         )
-        listed([_sensor_text(name, offset) for name, offset in result.offsets.items()])
-        answer(
-            "% of RMS: RMS error over the logged signal's RMS about its mean; "
-            f"% of range: over its range; after {result.transient:g} s"
-        )
-        listed([f"{name}: {text}" for name, text in result.notes.items()])
-    return 1 if result.status == "fail" else 0
+        for e in result.errors
+    ]
+    print_table(
+        ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", ""), rows
+    )
+    listed([_sensor_text(name, offset) for name, offset in result.offsets.items()])
+    answer(
+        "% of RMS: RMS error over the logged signal's RMS about its mean; "
+        f"% of range: over its range; after {result.transient:g} s"
+    )
+    listed([f"{name}: {text}" for name, text in result.notes.items()])
 
 
 def _sensor_text(name: str, value: float) -> str:

@@ -37,9 +37,9 @@ def assets() -> str:
     library = (vendor / "uPlot.iife.min.js").read_text(encoding="utf-8")
     style = (vendor / "uPlot.min.css").read_text(encoding="utf-8")
     licence = (vendor / "LICENSE-uplot.txt").read_text(encoding="utf-8")
-    own = files("elevon.report") / "templates"
-    look = (own / "charts.css").read_text(encoding="utf-8")
-    script = (own / "charts.js").read_text(encoding="utf-8")
+    templates = files("elevon.report") / "templates"
+    look = (templates / "charts.css").read_text(encoding="utf-8")
+    script = (templates / "charts.js").read_text(encoding="utf-8")
     return (
         f"<style>{style}\n{look}</style>\n"
         f"<script>/*\n{licence}*/\n{library}</script>\n<script>\n{script}</script>"

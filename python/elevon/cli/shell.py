@@ -1,0 +1,100 @@
+"""The shell of a command: the options that many share, the report, and what is printed."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, get_type_hints
+
+import typer
+
+from elevon.cli import common
+from elevon.cli.output import print_json, say
+from elevon.files import check_output
+from elevon.report import Report
+from elevon.results import Result
+
+#: Options that a command names instead of taking them; the callbacks of some do their work.
+_SHARED: Mapping[str, tuple[object, object]] = {
+    "strict": (common.StrictOption, False),
+    "details": (common.DetailsOption, False),
+    "json": (common.JsonOption, False),
+    "report": (common.ReportOption, None),
+    "force": (common.ForceOption, False),
+    "date": (common.DateOption, None),
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command has found.
+
+    Attributes
+    ----------
+    data : mapping or Result
+        What ``--json`` prints.
+    show : callable
+        Prints it for a person.
+    code : int
+        Exit code.
+    page : callable, optional
+        The page that ``--report`` writes; given the date where the command has that option.
+    """
+
+    data: Mapping[str, Any] | Result
+    show: Callable[[], None]
+    code: int = 0
+    page: Callable[..., Report] | None = None
+
+
+def command(
+    app: typer.Typer, *shared: str, name: str | None = None
+) -> Callable[[Callable[..., Answer]], Callable[..., Answer]]:
+    """Return a decorator that adds a command with ``--json`` and the shared options it names.
+
+    ``report`` is written before the answer, and refused before the work where it cannot be.
+    """
+
+    def add(work: Callable[..., Answer]) -> Callable[..., Answer]:
+        app.command(name)(_shell(work, (*shared, "json")))
+        return work
+
+    return add
+
+
+def _shell(work: Callable[..., Answer], shared: tuple[str, ...]) -> Callable[..., int]:
+    taken = inspect.signature(work).parameters
+    added = [name for name in shared if name not in taken]
+    hints = get_type_hints(work, include_extras=True)
+    hints |= {name: _SHARED[name][0] for name in added}
+    hints.pop("return", None)
+
+    @wraps(work)
+    def shell(**options: Any) -> int:
+        given = {name: options.pop(name) for name in added}
+        report, force = given.get("report"), {**options, **given}.get("force", False)
+        if report is not None:
+            check_output(report, force=force)
+        found = work(**options)
+        if report is not None and found.page is not None:
+            page = found.page(date=given["date"]) if "date" in given else found.page()
+            say(f"report: {page.save(report, force=force)}")
+        if given["json"]:
+            data = found.data
+            print_json(data.to_dict(stored=False) if isinstance(data, Result) else data)
+        else:
+            found.show()
+        return found.code
+
+    kind = inspect.Parameter.KEYWORD_ONLY
+    options = [
+        inspect.Parameter(name, kind, default=_SHARED[name][1], annotation=hints[name])
+        for name in added
+    ]
+    known = [item.replace(annotation=hints[name]) for name, item in taken.items()]
+    shell.__signature__ = inspect.Signature([*known, *options])  # type: ignore[attr-defined]
+    shell.__annotations__ = hints
+    del shell.__dict__["__wrapped__"]
+    return shell
