@@ -44,7 +44,7 @@ class As:
         Whether it is a mapping whose own keys stand in its place.
     kind : str
         ``printed``; ``stored``: in files, not in what commands print; ``working``: nowhere, the
-        field is known to the process that computed it only and has a default.
+        field is known to the process that computed it only; read back, it has its default.
     """
 
     keys: tuple[str, ...] = ()
@@ -229,8 +229,6 @@ def _slot(item: Any, hint: object) -> _Slot:
     marks = [mark for mark in get_args(hint)[1:] if isinstance(mark, As)]
     kind = next((mark.kind for mark in marks if mark.kind != "printed"), "printed")
     optional = not (item.default is MISSING and item.default_factory is MISSING)
-    if kind == "working" and not optional:
-        raise TypeError(f"{item.name}: a working field needs a default")
     return _Slot(
         name=item.name,
         type=get_args(hint)[0] if get_origin(hint) is Annotated else hint,
@@ -246,6 +244,9 @@ def _arguments(cls: type, data: object, place: str) -> dict[str, Any]:
     if not isinstance(data, Mapping):
         raise FormatError(f"{place} = {data!r} is not a table of keys")
     slots = [slot for slot in _slots(cls) if slot.kind != "working"]
+    for slot in _slots(cls):
+        if slot.kind == "working" and not slot.optional:
+            raise TypeError(f"{slot.name}: a working field of what is read back needs a default")
     known = [item.partition("=")[0] for item in getattr(cls, "COMPUTED", ())]
     known += [name.partition(".")[0] for slot in slots if not slot.remainder for name in slot.keys]
     more = {name: value for name, value in data.items() if name not in known}

@@ -65,36 +65,36 @@ def command(
 
 
 def _shell(work: Callable[..., Answer], shared: tuple[str, ...]) -> Callable[..., int]:
-    taken = inspect.signature(work).parameters
-    added = [name for name in shared if name not in taken]
+    parameters = inspect.signature(work).parameters
+    extra = [name for name in shared if name not in parameters]
     hints = get_type_hints(work, include_extras=True)
-    hints |= {name: _SHARED[name][0] for name in added}
+    hints |= {name: _SHARED[name][0] for name in extra}
     hints.pop("return", None)
 
     @wraps(work)
     def shell(**options: Any) -> int:
-        given = {name: options.pop(name) for name in added}
-        report, force = given.get("report"), {**options, **given}.get("force", False)
+        values = {name: options.pop(name) for name in extra}
+        report, force = values.get("report"), {**options, **values}.get("force", False)
         if report is not None:
             check_output(report, force=force)
-        found = work(**options)
-        if report is not None and found.page is not None:
-            page = found.page(date=given["date"]) if "date" in given else found.page()
+        result = work(**options)
+        if report is not None and result.page is not None:
+            page = result.page(date=values["date"]) if "date" in values else result.page()
             say(f"report: {page.save(report, force=force)}")
-        if given["json"]:
-            data = found.data
+        if values["json"]:
+            data = result.data
             print_json(data.to_dict(stored=False) if isinstance(data, Result) else data)
         else:
-            found.show()
-        return found.code
+            result.show()
+        return result.code
 
     kind = inspect.Parameter.KEYWORD_ONLY
     options = [
         inspect.Parameter(name, kind, default=_SHARED[name][1], annotation=hints[name])
-        for name in added
+        for name in extra
     ]
-    known = [item.replace(annotation=hints[name]) for name, item in taken.items()]
-    shell.__signature__ = inspect.Signature([*known, *options])  # type: ignore[attr-defined]
+    leading = [item.replace(annotation=hints[name]) for name, item in parameters.items()]
+    shell.__signature__ = inspect.Signature([*leading, *options])  # type: ignore[attr-defined]
     shell.__annotations__ = hints
     del shell.__dict__["__wrapped__"]
     return shell

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from elevon.plain import Plain
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class Check(Plain):
     """A number held against its limit.
 
     Attributes
@@ -26,6 +28,8 @@ class Check:
         Whether `limit` is the smallest allowed value instead of the largest.
     """
 
+    COMPUTED = ("passed",)
+
     name: str
     value: float
     limit: float
@@ -38,17 +42,6 @@ class Check:
         if not math.isfinite(self.value):
             return False
         return self.value >= self.limit if self.at_least else self.value <= self.limit
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the check as the command line prints it."""
-        return {
-            "name": self.name,
-            "value": self.value,
-            "limit": self.limit,
-            "unit": self.unit,
-            "at_least": self.at_least,
-            "passed": self.passed,
-        }
 
 
 def all_passed(checks: Iterable[Check]) -> bool:
@@ -63,3 +56,17 @@ def verdict(checks: Sequence[Check]) -> dict[str, object]:
         "status": "pass" if all_passed(checks) else "fail",
         "checks": [check.to_dict() for check in checks],
     }
+
+
+class CheckedResult(Plain):
+    """A result that is judged: its JSON form begins with ``status`` and ``checks``."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def checks(self) -> Sequence[Check]:
+            """What it is held to."""
+
+    def to_dict(self, *, stored: bool = True) -> dict[str, Any]:
+        """Return the JSON form, the verdict first."""
+        return {**verdict(self.checks), **super().to_dict(stored=stored)}

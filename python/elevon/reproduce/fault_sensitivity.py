@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from elevon.compare import RATES, filtered
 from elevon.data import read_table
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault, find_record
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario import Scenario
@@ -40,7 +41,7 @@ FLOORS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Sensitivity:
+class Sensitivity(Plain):
     """One fault: the change it makes in one feature.
 
     Attributes
@@ -55,12 +56,14 @@ class Sensitivity:
         Why the reduced-order model cannot have the fault, from the catalogue; else empty.
     """
 
+    COMPUTED = ("ratio", "verdict")
+
     fault: str
     feature: str
     high: float
     low: float
     floor: float
-    reason: str = ""
+    reason: Annotated[str, WORKING] = ""
 
     @property
     def ratio(self) -> float:
@@ -83,18 +86,6 @@ class Sensitivity:
             if self.ratio < 0.0
             else "too weak in the reduced-order model"
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {
-            "fault": self.fault,
-            "feature": self.feature,
-            "high": self.high,
-            "low": self.low,
-            "floor": self.floor,
-            "ratio": self.ratio,
-            "verdict": self.verdict,
-        }
 
 
 def fault_sensitivity(

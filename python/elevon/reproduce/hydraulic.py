@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from elevon.plain import Plain
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.report.checks import Check, verdict
+from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.pisa_gear import Stroke, run_strokes
 
 TEMPERATURES = (-40.0, 20.0, 70.0)
@@ -106,19 +106,12 @@ class HydraulicRow(Plain):
 
 
 @dataclass(frozen=True)
-class HydraulicResult:
+class HydraulicResult(CheckedResult):
     """Everything `elevon reproduce pisa-hydraulic` reports."""
 
     rows: list[HydraulicRow]
     checks: list[Check]
-    temperatures: tuple[float, ...] = TEMPERATURES
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        return {
-            **verdict(self.checks),
-            "rows": [row.to_dict() for row in self.rows],
-        }
+    temperatures: Annotated[tuple[float, ...], WORKING] = TEMPERATURES
 
 
 def reproduce_hydraulic(

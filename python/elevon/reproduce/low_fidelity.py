@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, default_scenario, filtered
+from elevon.plain import Plain
 from elevon.progress import Progress
-from elevon.report import Check, verdict
+from elevon.report import Check
+from elevon.report.checks import CheckedResult
 from elevon.scenario import Scenario
 
 POSITION_LIMIT = 0.005
@@ -26,7 +27,7 @@ held beside the ripple floor, not against a limit."""
 
 
 @dataclass(frozen=True, slots=True)
-class CaseRow:
+class CaseRow(Plain):
     """One case.
 
     Attributes
@@ -57,13 +58,9 @@ class CaseRow:
             checks.append(Check(f"{self.name}: q current", self.q_current_nrmse, limit, ""))
         return checks
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {name: getattr(self, name) for name in self.__slots__}
-
 
 @dataclass(frozen=True, slots=True)
-class LowFidelityResult:
+class LowFidelityResult(CheckedResult):
     """All three cases."""
 
     actuator: str
@@ -73,15 +70,6 @@ class LowFidelityResult:
     def checks(self) -> list[Check]:
         """Position everywhere, current where it exceeds the relay band."""
         return [check for row in self.rows for check in row.checks()]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        checks = self.checks
-        return {
-            **verdict(checks),
-            "actuator": self.actuator,
-            "rows": [row.to_dict() for row in self.rows],
-        }
 
 
 def reproduce_low_fidelity(

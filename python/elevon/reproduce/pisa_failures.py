@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +16,11 @@ import numpy.typing as npt
 from elevon.actuator import Actuator
 from elevon.errors import SimulationError
 from elevon.faults.catalogue import FaultRecord
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.recording.states import code_names
-from elevon.report.checks import Check, verdict
+from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.pisa_gear import ACTUATOR
 
 RECORD = (
@@ -78,7 +79,7 @@ LISTED: Mapping[tuple[str, str, str], str] = {}
 
 
 @dataclass(frozen=True, slots=True)
-class FailureRow:
+class FailureRow(Plain):
     """One fault in one phase."""
 
     fault: str
@@ -89,41 +90,18 @@ class FailureRow:
     detected_by: str
     time_s: float | None
     sensors: str
-    listed: bool
+    listed: Annotated[bool, WORKING]
     position_mm: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {
-            "fault": self.fault,
-            "phase": self.phase,
-            "indicated": self.indicated,
-            "true_state": self.true_state,
-            "safe": self.safe,
-            "detected_by": self.detected_by,
-            "time_s": self.time_s,
-            "sensors": self.sensors,
-            "position_mm": self.position_mm,
-        }
 
 
 @dataclass(frozen=True)
-class FailuresResult:
+class FailuresResult(CheckedResult):
     """Everything `elevon reproduce pisa-failures` reports."""
 
     rows: list[FailureRow]
     fidelity: str
     checks: list[Check]
     seed: int
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        return {
-            **verdict(self.checks),
-            "fidelity": self.fidelity,
-            "rows": [row.to_dict() for row in self.rows],
-            "seed": self.seed,
-        }
 
 
 @dataclass(frozen=True, slots=True)

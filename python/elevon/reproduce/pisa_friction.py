@@ -10,17 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import SimulationError
-from elevon.plain import Plain
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.report.checks import Check, verdict
+from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.pisa_gear import ACTUATOR, Stroke, run_strokes
 
 GRAVITY = 9.80665
@@ -73,23 +73,15 @@ class FrictionTrace:
 
 
 @dataclass(frozen=True)
-class FrictionResult:
+class FrictionResult(CheckedResult):
     """Everything `elevon reproduce pisa-friction` reports; the rows of functional runs first."""
 
     rows: list[FrictionRow]
     checks: list[Check]
     seed: int
-    traces: list[FrictionTrace]
-    tables: dict[str, list[tuple[float, float]]]
+    traces: Annotated[list[FrictionTrace], WORKING]
+    tables: Annotated[dict[str, list[tuple[float, float]]], WORKING]
     """The set's own friction: kind and direction to pairs of mm/s and N."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        return {
-            **verdict(self.checks),
-            "rows": [row.to_dict() for row in self.rows],
-            "seed": self.seed,
-        }
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from elevon.arrays import Floats
 from elevon.data import read_table
 from elevon.errors import InputError
 from elevon.faults import FaultRecord, catalogue
+from elevon.plain import key
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.report import Check, verdict
+from elevon.report import Check
+from elevon.report.checks import CheckedResult
 from elevon.scenario import Scenario
 from elevon.simulate import Run, simulate_batch
 
@@ -96,11 +98,12 @@ class Signature:
 
 
 @dataclass(frozen=True)
-class SignaturesResult:
+class SignaturesResult(CheckedResult):
     """The gallery."""
 
-    signatures: tuple[Signature, ...]
+    signatures: Annotated[tuple[Signature, ...], key("rows")]
 
+    @property
     def checks(self) -> list[Check]:
         """Return what must hold: no run left the numbers; what leaves no trace is counted."""
         diverged = sum(item.status == "diverged" for item in self.signatures)
@@ -109,14 +112,6 @@ class SignaturesResult:
             Check("faults whose run diverged", float(diverged), 0.0, "faults"),
             Check("faults without any trace", float(len(silent)), _SILENT, "faults"),
         ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        checks = self.checks()
-        return {
-            **verdict(checks),
-            "rows": [item.to_dict() for item in self.signatures],
-        }
 
 
 def reproduce_signatures(
@@ -197,9 +192,9 @@ def _motion(actuator: Actuator) -> Scenario:
 
 
 def _severity(record: FaultRecord) -> float:
-    for key in (f"{record.kind} {record.unit}", record.kind):
-        if key in _SEVERITIES:
-            return min(_SEVERITIES[key], record.maximum)
+    for name in (f"{record.kind} {record.unit}", record.kind):
+        if name in _SEVERITIES:
+            return min(_SEVERITIES[name], record.maximum)
     if not np.isfinite(record.maximum):
         raise InputError(f"{record.kind} [{record.unit}]: the gallery knows no severity to show")
     return record.maximum

@@ -36,7 +36,7 @@ def signatures_page(result: SignaturesResult, date: str | None = None) -> Report
         for item in mine:
             section.figure(_pair(item), _caption(item))
     section = report.section("All of them")
-    section.checks(result.checks())
+    section.checks(result.checks)
     rows = [list(item.to_dict().values()) for item in result.signatures]
     section.table(ReportTable(list(result.signatures[0].to_dict()), rows, digits=3))
     return report

@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
+from elevon.plain import WORKING, Plain, key
 from elevon.progress import Progress
-from elevon.report.checks import Check, verdict
+from elevon.report.checks import Check, CheckedResult
 from elevon.safety.hazards import HAZARDS, RECORD, observe
 from elevon.safety.rates import rate
 from elevon.safety.reasons import reason
@@ -59,12 +60,19 @@ class HazardRow:
 
 
 @dataclass(frozen=True)
-class HazardResult:
+class HazardResult(Plain):
     """One hazard: how many rows show it, how many of them are listed, how likely an hour is."""
 
+    COMPUTED = ("rows", "listed", "single", "per_hour")
+
     name: str
-    severe: bool
-    findings: tuple[HazardRow, ...]
+    severe: Annotated[bool, WORKING]
+    findings: Annotated[tuple[HazardRow, ...], WORKING]
+
+    @property
+    def rows(self) -> int:
+        """Rows that show it."""
+        return len(self.findings)
 
     @property
     def listed(self) -> int:
@@ -82,19 +90,9 @@ class HazardResult:
         combinations = {item.row.combination: item.row.faults for item in self.findings}
         return sum(rate([fault.kind for fault in faults]) for faults in combinations.values())
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the entry of the JSON object."""
-        return {
-            "name": self.name,
-            "rows": len(self.findings),
-            "listed": self.listed,
-            "single": self.single,
-            "per_hour": self.per_hour,
-        }
-
 
 @dataclass(frozen=True)
-class SafetyResult:
+class SafetyResult(CheckedResult):
     """What the campaign showed.
 
     Attributes
@@ -113,25 +111,19 @@ class SafetyResult:
         Of surroundings and triples.
     """
 
+    COMPUTED = ("rows",)
+
     runs: int
-    repeated: int
+    repeated: Annotated[int, key("repeated_at_high")]
     groups: dict[str, int]
     hazards: tuple[HazardResult, ...]
     checks: list[Check]
     seed: int
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        findings = itertools.chain.from_iterable(item.findings for item in self.hazards)
-        return {
-            **verdict(self.checks),
-            "runs": self.runs,
-            "repeated_at_high": self.repeated,
-            "groups": self.groups,
-            "hazards": [item.to_dict() for item in self.hazards],
-            "rows": [finding.to_dict() for finding in findings],
-            "seed": self.seed,
-        }
+    @property
+    def rows(self) -> list[HazardRow]:
+        """What shows a hazard, hazard by hazard."""
+        return [finding for item in self.hazards for finding in item.findings]
 
 
 def safety(

@@ -48,15 +48,6 @@ class ComplianceFit:
     weights: Array
     scale: float
 
-    def to_dict(self) -> dict[str, object]:
-        """Return the numbers a report prints."""
-        return {
-            "stiffness": self.stiffness,
-            "offset": self.offset,
-            "group_offsets": self.group_offsets.tolist(),
-            "scale": self.scale,
-        }
-
 
 def load_on_loss(load: Array, loss: Array) -> float:
     """Slope of the least-squares line of load on loss (load per loss)."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
+from elevon.plain import Plain
 from elevon.progress import Progress
 from elevon.report.checks import Check, verdict
 from elevon.units import to_si
@@ -50,7 +51,7 @@ FIGURES = {
 
 
 @dataclass(frozen=True, slots=True)
-class CurrentRow:
+class CurrentRow(Plain):
     """One experiment: what was run, and the RMS error in percent of the measured current's RMS."""
 
     state: str
@@ -59,10 +60,6 @@ class CurrentRow:
     load: str
     percent_rms: float
     rms_a: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {name: getattr(self, name) for name in self.__slots__}
 
 
 @dataclass(frozen=True)

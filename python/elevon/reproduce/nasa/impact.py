@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.plain import WORKING, Plain, key
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.features import FEATURES, PEAK
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
@@ -26,23 +27,21 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Impact:
+class Impact(Plain):
     """Excess of the load cell's peak under a gap over the healthy one, N, with its interval."""
 
-    profile: str
-    load: float
-    excess: float
-    low: float
-    high: float
+    COMPUTED = ("interval_n",)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return one row of the command's JSON object."""
-        return {
-            "profile": self.profile,
-            "load_n": self.load,
-            "excess_n": self.excess,
-            "interval_n": [self.low, self.high],
-        }
+    profile: str
+    load: Annotated[float, key("load_n")]
+    excess: Annotated[float, key("excess_n")]
+    low: Annotated[float, WORKING]
+    high: Annotated[float, WORKING]
+
+    @property
+    def interval_n(self) -> tuple[float, float]:
+        """Both ends."""
+        return self.low, self.high
 
 
 @dataclass(frozen=True, slots=True)

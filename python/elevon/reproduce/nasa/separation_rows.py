@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
-from elevon.report.checks import Check, verdict
+from elevon.plain import REMAINDER, WORKING
+from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.nasa.effect import Effect
 from elevon.reproduce.nasa.impact import Impact, ImpactTrace
 
@@ -83,7 +84,7 @@ class SeparationRow:
 
 
 @dataclass(frozen=True)
-class SeparationResult:
+class SeparationResult(CheckedResult):
     """Everything `elevon reproduce nasa-separation` reports.
 
     Attributes
@@ -112,8 +113,8 @@ class SeparationResult:
     healthy: int
     reassemblies: int
     level: float
-    traces: list[ImpactTrace] = field(default_factory=list)
-    meta: dict[str, Any] = field(default_factory=dict)
+    traces: Annotated[list[ImpactTrace], WORKING] = field(default_factory=list)
+    meta: Annotated[dict[str, Any], REMAINDER] = field(default_factory=dict)
 
     def winners(self) -> dict[tuple[str, float], str | None]:
         """Return the best profile of each fault and load, None where none can be named."""
@@ -123,18 +124,3 @@ class SeparationResult:
             if row.winner:
                 best[row.fault, row.load] = row.profile
         return best
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        return {
-            **verdict(self.checks),
-            "rows": [row.to_dict() for row in self.rows],
-            "impacts": [impact.to_dict() for impact in self.impacts],
-            "null_rate": self.null_rate,
-            "null_tables": self.null_tables,
-            "seed": self.seed,
-            "healthy": self.healthy,
-            "reassemblies": self.reassemblies,
-            "level": self.level,
-            **self.meta,
-        }
