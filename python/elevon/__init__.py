@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from elevon.results import Result as Result
     from elevon.results import load as load
     from elevon.scenario import Scenario as Scenario
+    from elevon.session import Fmu as Fmu
     from elevon.session import Session as Session
     from elevon.simulate import Run as Run
     from elevon.simulate import simulate as simulate
@@ -61,6 +62,7 @@ _PUBLIC = {
     "Clock": "elevon.recording",
     "ElevonError": "elevon.errors",
     "ElevonWarning": "elevon.errors",
+    "Fmu": "elevon.session",
     "InputError": "elevon.errors",
     "NotActingWarning": "elevon.errors",
     "Recording": "elevon.recording",

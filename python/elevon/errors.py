@@ -92,12 +92,19 @@ class SimulationError(ElevonError):
     Attributes
     ----------
     status : str
-        `diverged` or `tripped`.
+        `diverged`, `tripped`; `failed` where a foreign model did.
     """
 
     def __init__(self, message: str, status: str = "diverged") -> None:
         super().__init__(message)
         self.status = status
+
+
+class ForeignModelError(SimulationError):
+    """A foreign FMU refused a call, or put out no number; its own words are quoted."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, "failed")
 
 
 class DivergedError(SimulationError):

@@ -8,6 +8,7 @@ EXTRAS = {
     "reports": ("jinja2", "markupsafe", "matplotlib"),
     "calibrate": ("scipy", "threadpoolctl", "tomlkit"),
     "cluster": ("dask", "distributed"),
+    "fmu": ("fmpy",),
     "gym": ("gymnasium",),
     "learn": ("sklearn",),
     "optimise": ("pymoo",),
@@ -17,7 +18,7 @@ EXTRAS = {
 }
 
 #: Extras that ``all`` leaves out: of studies and tests alone, under another licence, for queries.
-APART = frozenset({"optimise", "progpy", "query", "sampling"})
+APART = frozenset({"fmu", "optimise", "progpy", "query", "sampling"})
 
 
 def missing_package(error: ModuleNotFoundError) -> str | None:

@@ -1,7 +1,8 @@
 """Live sessions: actuators that are stepped, read and changed while they run."""
 
+from elevon.session.fmu import Fmu
 from elevon.session.loop import Controller, run_loop
 from elevon.session.session import Session
 from elevon.session.start import SessionState
 
-__all__ = ["Controller", "Session", "SessionState", "run_loop"]
+__all__ = ["Controller", "Fmu", "Session", "SessionState", "run_loop"]

@@ -10,14 +10,16 @@ from typing import Any
 from elevon.actuator import Actuator
 from elevon.documents import Document, validated
 from elevon.errors import ArgumentTypeError, InputError, unknown
-from elevon.faults import Fault, find_record
+from elevon.faults import Fault
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario import Term
 from elevon.scenario.compile import compile_term, port_units, signal_records
+from elevon.session.coupling import coupled
 from elevon.session.divergence import diverged_error, diverged_runs
-from elevon.session.start import SessionState, fault_places, runs_of
+from elevon.session.fmu import Fmu
+from elevon.session.start import SessionState, announced, fault_places, runs_of
 from elevon.session.values import Value, one_each, quantity, text, texts, whole_steps
 from elevon.simulate.acting import report
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike
@@ -57,6 +59,10 @@ class Session:
         Signals to read that need equations of their own (energies, filtered currents, vibration).
     lanes : str
         Vector width, as for `elevon.simulate`.
+    controller : Fmu, optional
+        Foreign FMU that drives it, sample by sample.
+    loads : sequence of Fmu
+        Foreign FMUs that load it.
 
     Attributes
     ----------
@@ -92,6 +98,8 @@ class Session:
         faults: Iterable[str] = (),
         signals: Iterable[str] = (),
         lanes: str = "auto",
+        controller: Fmu | None = None,
+        loads: Sequence[Fmu] = (),
     ) -> None:
         runs = runs_of(actuator, scenario, mode, seed)
         self.many = not isinstance(actuator, (Actuator, str, os.PathLike))
@@ -113,17 +121,20 @@ class Session:
             self.wiring,
             fidelity,
             [{**item.core, "duration": _FOREVER * self.step} for item in prepared],
-            [*self._tunable(tunable), *self._moved(faults)],
+            announced(self.wiring, tunable, faults),
             [self._known(name) for name in texts(signals, "signals")],
             text(lanes, "lanes"),
         )
         self._readable: dict[str, bool] = {}
         self._driven: set[str] = set()
         self._diverged: set[int] = set()
+        self._coupling = None
+        self._coupling = coupled(self, controller, loads)
 
     @property
     def _kind(self) -> tuple[Any, ...]:
-        return (self.wiring, self.fidelity, self.step, *self._modes)
+        coupled = () if self._coupling is None else ("coupled",)
+        return (self.wiring, self.fidelity, self.step, *self._modes, *coupled)
 
     def __repr__(self) -> str:
         names = dict.fromkeys(actuator.name for actuator in self.actuators)
@@ -184,7 +195,15 @@ class Session:
             with them. With none left, every call raises.
         """
         seconds = parse_quantity(duration, "s", "advance")
-        diverged = self._core.advance(whole_steps(seconds, self.step, _FOREVER - self._core.steps))
+        steps = whole_steps(seconds, self.step, _FOREVER - self._core.steps)
+        if self._coupling is None:
+            self._advance(steps)
+            return
+        for portion in self._coupling.portions(self, steps, self._core.steps):
+            self._advance(portion)
+
+    def _advance(self, steps: int) -> None:
+        diverged = self._core.advance(steps)
         if diverged:
             self._raise_diverged(diverged)
 
@@ -323,6 +342,11 @@ class Session:
 
     def save(self) -> SessionState:
         """Return the state as it is now; the session goes on without touching it."""
+        if self._coupling is not None:
+            raise InputError("save: the state of a coupled FMU is no part of the session's")
+        return self._state()
+
+    def _state(self) -> SessionState:
         faults = tuple(dict(item) for item in self._faults)
         return SessionState(self._core.copy(), self.actuators, faults, self._kind)
 
@@ -345,7 +369,7 @@ class Session:
     @contextmanager
     def _whole(self) -> Iterator[None]:
         """Undo what a change has done to some inputs or runs when another one refuses it."""
-        state = self.save()
+        state = self._state()
         try:
             yield
         except BaseException:
@@ -371,13 +395,3 @@ class Session:
             f"{name}: the equations in use leave it out; announce it: Session(..., "
             f"{option}=[{name!r}])"
         )
-
-    def _tunable(self, paths: Iterable[str]) -> list[str]:
-        return [record_of(self.wiring, path).path for path in texts(paths, "tunable")]
-
-    def _moved(self, faults: Iterable[str]) -> list[str]:
-        moved: list[str] = []
-        for name in texts(faults, "faults"):
-            kind, _, place = name.partition("@")
-            moved += find_record(kind, place, self.wiring).targets[place]
-        return moved

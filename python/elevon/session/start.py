@@ -9,7 +9,10 @@ from typing import Any
 
 from elevon.actuator import Actuator
 from elevon.errors import ArgumentTypeError, InputError
+from elevon.faults import find_record
+from elevon.parameters.records import record_of
 from elevon.scenario import Scenario
+from elevon.session.values import texts
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator
 from elevon.simulate.prepare import Run
 
@@ -56,3 +59,12 @@ def runs_of(
 def fault_places(scenario: Scenario) -> dict[str, int]:
     """Return ``KIND@PLACE`` of a scenario's faults to their places in its list."""
     return {f"{fault.kind}@{fault.place}": i for i, fault in enumerate(scenario.fault)}
+
+
+def announced(wiring: str, tunable: Iterable[str], faults: Iterable[str]) -> list[str]:
+    """Return the parameters that a session will change: those named, and those that faults move."""
+    paths = [record_of(wiring, path).path for path in texts(tunable, "tunable")]
+    for name in texts(faults, "faults"):
+        kind, _, place = name.partition("@")
+        paths += find_record(kind, place, wiring).targets[place]
+    return paths
