@@ -11,6 +11,7 @@ EXTRAS = {
     "fmu": ("fmpy",),
     "gym": ("gymnasium",),
     "learn": ("sklearn",),
+    "live": ("starlette", "uvicorn", "websockets"),
     "optimise": ("pymoo",),
     "progpy": ("progpy",),
     "query": ("duckdb", "polars"),

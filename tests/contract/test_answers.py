@@ -77,6 +77,7 @@ ANSWERS = {
               True),
     "diagnose-train": (("--out", "own.npz", "--units", "8", "--low-units", "8", "--rounds", "50",
                         "--test-units", "2"), r"^trained: own\.npz", (), True),
+    "live": (("--fidelity", "low", "--static", "page"), r"^7 files in page$", (), True),
     "demo": (("--part", "bench", "--out", "demo"), r"^\d+ of \d+ checks passed$", (), True),
     "reproduce low-fidelity": ((), r"^(pass|fail): \d+ of \d+ checks$", (), True),
     "reproduce torino-compliance": ((), r"^(pass|fail): \d+ of \d+ checks$", (), False),

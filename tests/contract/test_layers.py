@@ -30,7 +30,7 @@ ROWS = [
     ["nexttest", "training"],
     ["prognose"],
     ["reproduce", "doors"],
-    ["demo", "safety"],
+    ["demo", "live", "safety"],
     ["cli"],
     ["__main__"],
 ]

@@ -192,6 +192,8 @@ RECIPES = {
     "diagnose-train": Recipe(("--out", "own.npz", "--units", "8", "--low-units", "2", "--rounds",
                               "10", "--test-units", "1", "--runs", "runs", "--force"), long=True,
                              points=2, code=(0, 1)),
+    "live": Recipe(("torino-rotary", "--fidelity", "low", "--static", "page", "--force"), long=True,
+                   points=4),
     "demo": Recipe(("--part", "bench", "--out", "demo", "--force"), long=True, points=2,
                    code=(0, 1)),
     "reproduce torino-compliance": Recipe(("--out", "rep", "--force"), code=(0, 1), before=(

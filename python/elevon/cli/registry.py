@@ -27,6 +27,7 @@ _HELP = {
     "new": "Write a commented file for an actuator of your own.",
     "check": "Report all that is wrong with a set or scenario file.",
     "simulate": "Simulate one actuator and keep what it did.",
+    "live": "Show an actuator at real time in the browser: move it, break it.",
     "campaign": "Run plans of many labelled simulations.",
     "dataset": "Describe, verify, export, split a data set.",
     "compare": "Compare the high and the low fidelity model.",

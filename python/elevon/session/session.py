@@ -14,7 +14,7 @@ from elevon.faults import Fault
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.scenario import Term
+from elevon.scenario import Terms
 from elevon.scenario.compile import compile_term, port_units, signal_records
 from elevon.session.coupling import coupled
 from elevon.session.divergence import diverged_error, diverged_runs
@@ -242,8 +242,8 @@ class Session:
         Parameters
         ----------
         **inputs : float, str, array_like of shape (runs,), or mapping
-            SI, or a text with a unit; a mapping is a waveform of a scenario file, in time from the
-            session's start.
+            SI, or a text with a unit; a mapping is a waveform of a scenario file, or a sum of them
+            (``{"terms": [...]}``), in time from the session's start.
 
         Raises
         ------
@@ -262,13 +262,18 @@ class Session:
         """Return the change of an input, checked: several change together or not at all."""
         self.unit(port)
         if isinstance(value, Mapping):
-            term = validated(Term, value, Document(port, "", {}))
-            terms = [compile_term(term, units[port], port) for units in self._units]
-            runs = range(len(terms))
-            return lambda: all(self._core.set_input(run, port, [terms[run]]) for run in runs)
+            sums = [self._terms(port, value, units[port]) for units in self._units]
+            return lambda: all(self._core.set_input(run, port, sum_) for run, sum_ in enumerate(sums))
         given = zip(one_each(value, len(self), port), self._units, strict=True)
         read = [quantity(each, units[port] or "1", port) for each, units in given]
         return lambda: bool(self._core.set_values(port, read))
+
+    @staticmethod
+    def _terms(port: str, given: Mapping[str, Any], unit: str) -> list[dict[str, Any]]:
+        """Return a waveform, or a sum of them, as the core takes it."""
+        place = Document(port, "", {})
+        sum_ = validated(Terms, given if "terms" in given else {"terms": [given]}, place)
+        return [compile_term(term, unit, port) for term in sum_.terms]
 
     def set_parameter(self, path: str, value: Value) -> None:
         """Give a parameter another value, from now on, beneath the faults that act on it.

@@ -1,0 +1,336 @@
+"""The live bench: one actuator, its clock, its recorder, its health, and the door to change it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.errors import ArgumentTypeError, InputError, unknown
+from elevon.live.describe import description
+from elevon.live.health import HealthWatch
+from elevon.live.journal import Journal
+from elevon.live.loop import LiveLoop
+from elevon.live.panel import WatchTable
+from elevon.live.recorder import Recorder, free_name
+from elevon.live.trace import Stretch, trace_signals, write_stretch
+
+if TYPE_CHECKING:
+    from elevon.live.unit import LiveUnit
+
+
+#: What a message to `act` may hold, in the order in which it is done.
+KEYS = ("restart", "factor", "pause", "set", "fault", "panel", "block", "command", "record", "save")
+_LOOK = 10.0  # s of a log that are diagnosed; two periods of a slower sine
+_LONGEST = 30.0
+_SHORTEST = 8.0
+_RUN_IN = 1.0  # s from a change of the command, the loads or a parameter that are not looked at
+_LEAST = 3.0  # s of an action
+_ENDED = 1.0  # s after an action's motion has ended at which it is diagnosed
+
+
+class LiveBench:
+    """What a page, or a program, sees and moves.
+
+    Parameters
+    ----------
+    unit : LiveUnit
+        The actuator.
+    factor : float
+        Simulated time over wall time.
+    folder : Path
+        Where recordings go.
+    baselines : sequence of Path
+        Healthy logs for the diagnosis.
+    mission : Path, optional
+        For the remaining life.
+    hide_truth : bool
+        Whether the faults that were set are told to nobody.
+    """
+
+    def __init__(
+        self,
+        unit: LiveUnit,
+        *,
+        factor: float = 1.0,
+        folder: Path | None = None,
+        baselines: Sequence[Path] = (),
+        mission: Path | None = None,
+        hide_truth: bool = False,
+    ) -> None:
+        self.unit = unit
+        self.loop = LiveLoop(unit, factor)
+        self.folder = folder or Path()
+        self.panel = WatchTable()
+        self.journal = Journal(unit.actuator, unit.fidelity, unit.seed)
+        self.hide_truth = hide_truth
+        self.recorder: Recorder | None = None
+        self.files: list[Path] = []
+        self._traced = trace_signals(unit.actuator, unit.fidelity)
+        self._columns = self.loop.ring.columns(self._traced)
+        self.watch = HealthWatch(
+            unit.actuator, unit.fidelity, self.stretch, baselines=baselines, mission=mission
+        )
+        self.loop.listener = self._sampled
+
+    def start(self) -> None:
+        """Begin to run, and to watch."""
+        self.loop.start()
+        self.watch.start()
+
+    def stop(self) -> None:
+        """End both."""
+        self.watch.stop()
+        self.loop.stop()
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page must know of the actuator."""
+        return description(self.unit)
+
+    def state(self) -> dict[str, Any]:
+        """Return time, factor, values, health, and how the bench stands."""
+        unit, recorder = self.unit, self.recorder
+        self.panel.refresh(unit)
+        _, _, rows = self.loop.ring.since(self.loop.ring.written - 1, range(len(unit.names)), 1)
+        values = rows[-1] if len(rows) else np.full(len(unit.names), math.nan)
+        status, message = unit.status
+        return {
+            "time": unit.time,
+            "factor": self.loop.reached_factor,
+            "values": dict(zip(unit.names, values.tolist(), strict=True)),
+            "health": self.watch.health.to_dict(),
+            "status": status,
+            "message": message,
+            "paused": self.loop.paused,
+            "factor_asked": self.loop.factor,
+            "panel": self.panel.to_dict(),
+            "command": None if unit.given is None else dict(unit.given),
+            "inputs": dict(unit.inputs),
+            "recording": None if recorder is None else self._recording(recorder),
+            "files": [path.name for path in self.files],
+            "injected": None if self.hide_truth else self._injected(),
+        }
+
+    def act(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        """Do what a message says, between two samples; return what came of it.
+
+        Parameters
+        ----------
+        message : mapping
+            ``command`` (as in a scenario file, runs at once), ``block`` (the same, waits for
+            ``panel: move``), ``panel``, ``set`` (inputs and parameters), ``fault`` (``KIND@PLACE``
+            to severity), ``record`` (``drive`` or true, ``full``, false), ``factor``, ``pause``,
+            ``restart``, ``save`` (returns the scenario of what was done).
+
+        Raises
+        ------
+        InputError
+            A key, a name or a value that cannot be; what stands before it in the order of `KEYS`
+            is done.
+        """
+        for key in message:
+            if key not in KEYS:
+                raise unknown("key", key, KEYS, "act")
+        return self.loop.call(lambda: self._act(message))
+
+    def stretch(self) -> Stretch | str:
+        """Return what a drive has logged of late, or why there is nothing to look at."""
+        return self.loop.call(self._stretch)
+
+    def _act(self, message: Mapping[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = {}
+        for key in KEYS:
+            if key in message:
+                getattr(self, f"_do_{key}")(message[key], answer)
+        done = {key: message[key] for key in KEYS if key in message}
+        self.journal.note(self.unit.time, done)
+        return {"time": self.unit.time, **answer}
+
+    def _do_restart(self, given: Any, _: dict[str, Any]) -> None:
+        if _switch("restart", given):
+            self.unit.restart()
+            self.panel = WatchTable()
+
+    def _do_factor(self, given: Any, _: dict[str, Any]) -> None:
+        if isinstance(given, bool) or not isinstance(given, (int, float)):
+            raise ArgumentTypeError(f"factor: {given!r:.60} is no number")
+        self.loop.set_factor(float(given))
+
+    def _do_pause(self, given: Any, _: dict[str, Any]) -> None:
+        self.loop.pause(_switch("pause", given))
+
+    def _do_set(self, given: Any, _: dict[str, Any]) -> None:
+        for name, value in _mapping("set", given).items():
+            self.unit.set(name, value)
+
+    def _do_fault(self, given: Any, _: dict[str, Any]) -> None:
+        for name, value in _mapping("fault", given).items():
+            self.unit.inject(name, value)
+
+    def _do_panel(self, given: Any, answer: dict[str, Any]) -> None:
+        if not isinstance(given, str):
+            raise ArgumentTypeError(f"panel: {given!r:.60} is no action")
+        self.panel.act(self.unit, given)
+        answer["panel"] = self.panel.to_dict()
+
+    def _do_block(self, given: Any, _: dict[str, Any]) -> None:
+        self.panel.submit(self.unit, _mapping("block", given))
+
+    def _do_command(self, given: Any, _: dict[str, Any]) -> None:
+        self.panel.run(self.unit, _mapping("command", given))
+
+    def _do_record(self, given: Any, answer: dict[str, Any]) -> None:
+        if given is False:
+            answer["files"] = [str(path) for path in self._written()]
+            return
+        if self.recorder is not None:
+            raise InputError("record: a recording runs; stop it with false")
+        kind = "drive" if given is True else given
+        if not isinstance(kind, str):
+            raise ArgumentTypeError(f"record: {given!r:.60} is neither true, false nor a kind")
+        names = self.unit.names
+        columns = self._columns if kind == "drive" else range(len(names))
+        self.recorder = Recorder(kind, names, list(columns), self.unit.period)
+
+    def _do_save(self, given: Any, answer: dict[str, Any]) -> None:
+        if _switch("save", given):
+            answer["scenario"] = self.journal.scenario(self.unit.time)
+            answer["steps"] = self.journal.steps()
+
+    def _sampled(self, time: float, values: Sequence[float]) -> None:
+        if self.recorder is not None:
+            self.recorder(time, values)
+
+    def _recording(self, recorder: Recorder) -> dict[str, Any]:
+        begun = recorder.begun
+        return {"kind": recorder.kind, "seconds": 0.0 if begun is None else self.unit.time - begun}
+
+    def _injected(self) -> dict[str, Any]:
+        return {name: fault.severity for name, fault in self.unit.faults.items()}
+
+    def _written(self) -> list[Path]:
+        """End the recording and write it; the files, the log first."""
+        recorder = self.recorder
+        if recorder is None:
+            raise InputError("record: no recording runs")
+        time, signals = recorder.taken()
+        self.recorder = None
+        actuator, name = self.unit.actuator, self.unit.actuator.name
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if recorder.kind == "drive":
+            path = free_name(self.folder, f"live-{name}", ".csv")
+            part = self._part(time, signals)
+            written = write_stretch(path, part, actuator, self.unit.fidelity)
+        else:
+            written = [self._full(time, signals)]
+        self.files += written
+        return written
+
+    def _full(self, time: Any, signals: Mapping[str, Any]) -> Path:
+        from elevon.recording import Recording
+
+        units = self.unit.units
+        recording = Recording.build(
+            time,
+            signals,
+            {name: units[name] for name in signals},
+            clock="live",
+            rate=1.0 / self.unit.period,
+            meta={
+                "status": self.unit.status[0],
+                "actuator": self.unit.actuator.name,
+                "fidelity": self.unit.fidelity,
+                "seed": self.unit.seed,
+                "steps": json.dumps(self.journal.steps()),
+            },
+        )
+        path = free_name(self.folder, f"live-{self.unit.actuator.name}-full", ".csv")
+        recording.save(path)
+        return path
+
+    def _part(self, time: Any, signals: Mapping[str, Any]) -> Stretch:
+        unit = self.unit
+        force = "load_force" if unit.actuator.wiring != "rotary" else None
+        output = unit.inputs.get("output", 0.0)
+        load = signals[force] if force in signals and output else np.zeros(len(time))
+        brake = signals.get("brake_torque")
+        given = None
+        if unit.given is not None:
+            given = moved_command(unit.given, unit.given_at - float(time[0]))
+        return Stretch(
+            time, signals, given, load,
+            brake=bool(unit.actuator.wiring == "rotary" and brake is not None and np.any(brake)),
+            seed=unit.seed,
+        )  # fmt: skip
+
+    def _stretch(self) -> Stretch | str:
+        unit = self.unit
+        if unit.given is None:
+            return "waiting for a command"
+        if unit.mode == "gear":
+            return self._action()
+        length = _length(unit.given)
+        begin = max(unit.time - length, max(unit.given_at, unit.changed_at) + _RUN_IN)
+        if unit.time - begin < min(_SHORTEST, length):
+            return "gathering a stretch of motion"
+        time, table = self.loop.ring.stretch(begin, self._columns)
+        return self._part(time, dict(zip(self._traced, table.T, strict=True)))
+
+    def _action(self) -> Stretch | str:
+        """Return the log of the last action, once its motion has ended."""
+        unit = self.unit
+        begin = unit.given_at - 0.2
+        if unit.time - unit.given_at < _LEAST:
+            return "waiting for the end of the motion"
+        time, table = self.loop.ring.stretch(begin, self._columns)
+        signals = dict(zip(self._traced, table.T, strict=True))
+        late = time > time[-1] - _ENDED
+        speed = np.abs(signals["motor_speed"])
+        if speed[late].max() > 0.01 * max(speed.max(), 1.0):
+            return "waiting for the end of the motion"
+        return self._part(time, signals)
+
+
+def moved_command(given: Mapping[str, Any], start: float) -> dict[str, Any]:
+    """Return a command with its instants moved to a start [s], as a note states it."""
+    from elevon.bench.rig import moved
+    from elevon.units import parse_quantity
+
+    out = dict(given)
+    if "terms" in given:
+        out["terms"] = [moved(dict(term), start) for term in given["terms"]]
+    if "steps" in given:
+        out["steps"] = [
+            {**step, "time": max(0.0, parse_quantity(step["time"], "s", "time") + start)}
+            for step in given["steps"]
+        ]
+    return out
+
+
+def _length(given: Mapping[str, Any]) -> float:
+    """Return how much of a motion is looked at [s]: two periods of a slow one."""
+    from elevon.units import parse_quantity
+
+    length = _LOOK
+    for term in given.get("terms", ()):
+        frequency = term.get("frequency")
+        if frequency is not None:
+            hertz = parse_quantity(frequency, "Hz", "frequency")
+            length = max(length, 2.0 / hertz if hertz > 0.0 else 0.0)
+    return min(length, _LONGEST)
+
+
+def _switch(name: str, given: Any) -> bool:
+    if not isinstance(given, bool):
+        raise ArgumentTypeError(f"{name}: {given!r:.60} is neither true nor false")
+    return given
+
+
+def _mapping(name: str, given: Any) -> Mapping[str, Any]:
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
+        raise ArgumentTypeError(f"{name}: {given!r:.60} is no table of names and values")
+    return given

@@ -1,0 +1,224 @@
+"""Health of a running actuator: diagnosis, again and again, of the last stretch a drive logs.
+
+What is diagnosed are the files that a recording of the same stretch would hold; the list of faults
+is nowhere near. The work is done by a process beside the simulation's, so that it slows nothing.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import tempfile
+import threading
+import time as clock
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elevon.errors import ElevonError
+from elevon.live.trace import Stretch, write_stretch
+from elevon.plain import Plain
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.bymodel.answer import Diagnosis
+
+
+FALSE_ALARM = 0.005
+"""Rate of one stretch at which a healthy unit may be called faulty: there are twenty a minute."""
+_SHARE = 6.0  # times the last diagnosis' processor time that pass until the next one
+_LEAST, _MOST = 1.0, 5.0  # s between two
+_NICE = 3
+
+
+@dataclass(frozen=True)
+class NamedFault(Plain):
+    """A cause with its severity, as in a diagnosis."""
+
+    kind: str
+    place: str
+    severity: float
+    unit: str
+    interval: tuple[float, float]
+    probability: float
+    ambiguous_with: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Health(Plain):
+    """What diagnosis says of the last stretch.
+
+    Attributes
+    ----------
+    status : str
+        ``waiting``, or as in a diagnosis: ``healthy``, ``faulty``, ``unknown_fault``,
+        ``model_does_not_fit``.
+    faults : tuple of NamedFault
+        Most probable first.
+    p_fault : float or None
+        Probability of any fault.
+    text : str
+        The verdict in a sentence, or what is waited for.
+    stretch : (float, float) or None
+        What was looked at [s].
+    since : float or None
+        End of the first of the stretches in a row that are not healthy [s].
+    remaining : str
+        Remaining life where a mission is given.
+    seconds : float
+        Processor time it took [s].
+    """
+
+    status: str = "waiting"
+    faults: tuple[NamedFault, ...] = ()
+    p_fault: float | None = None
+    text: str = "waiting for motion"
+    stretch: tuple[float, float] | None = None
+    since: float | None = None
+    remaining: str = ""
+    seconds: float = 0.0
+
+
+def health_of(answer: Diagnosis, *, remaining: str = "", seconds: float = 0.0) -> Health:
+    """Return what a diagnosis says."""
+    faults = tuple(
+        NamedFault(
+            cause.kind, cause.place, cause.severity, cause.unit, cause.interval,
+            cause.probability, tuple(place.key for place in cause.ambiguous_with),
+        )
+        for cause in answer.faults
+    )  # fmt: skip
+    return Health(
+        answer.status, faults, answer.p_fault, answer.headline, remaining=remaining,
+        seconds=seconds,
+    )  # fmt: skip
+
+
+def examine(path: str, actuator: Actuator, baselines: Sequence[str], mission: str | None) -> Health:
+    """Diagnose a log; run in the process beside."""
+    from elevon.diagnose.door import diagnose
+
+    begin = clock.process_time()
+    try:
+        answer = diagnose(path, actuator, list(baselines), false_alarm=FALSE_ALARM)
+    except ElevonError as error:
+        return Health(text=str(error).partition(": ")[2] or str(error))
+    remaining = ""
+    if mission is not None and answer.status == "faulty":
+        from elevon.live.remaining import remaining_life
+
+        remaining = remaining_life(answer, actuator, mission)
+    return health_of(answer, remaining=remaining, seconds=clock.process_time() - begin)
+
+
+def _work(door: Connection) -> None:
+    """Answer requests until the door closes.
+
+    Ctrl-C is left to the process that asked, and the processor to the simulation.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(_NICE)
+    from elevon.diagnose import door as _ready  # noqa: F401 - loaded before the first request
+
+    with suppress(EOFError, OSError):
+        while True:
+            door.send(examine(*door.recv()))
+
+
+class HealthWatch:
+    """Diagnoses the last stretch, and the next one when that is done.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The healthy unit.
+    fidelity : str
+        Of what runs: which channels there are.
+    stretch : callable
+        Returns what a drive has logged of late, or why there is nothing to look at.
+    baselines : sequence of Path
+        Healthy logs.
+    mission : Path, optional
+        For the remaining life.
+    """
+
+    def __init__(
+        self,
+        actuator: Actuator,
+        fidelity: str,
+        stretch: Callable[[], Stretch | str],
+        *,
+        baselines: Sequence[Path] = (),
+        mission: Path | None = None,
+    ) -> None:
+        self.health = Health()
+        self._actuator, self._fidelity, self._stretch = actuator, fidelity, stretch
+        self._baselines = [str(path) for path in baselines]
+        self._mission = None if mission is None else str(mission)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="health", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End; a diagnosis that is under way is dropped."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        door, inner = context.Pipe()
+        worker = context.Process(target=_work, args=(inner,), name="diagnosis", daemon=True)
+        worker.start()
+        inner.close()
+        try:
+            with tempfile.TemporaryDirectory(prefix="elevon-live-") as folder:
+                self._watch(door, Path(folder))
+        except (EOFError, OSError):
+            self.health = Health(text="the process that diagnoses has ended")
+        finally:
+            door.close()
+            worker.terminate()
+            worker.join()
+
+    def _watch(self, door: Connection, folder: Path) -> None:
+        pause = _LEAST
+        while not self._stop.wait(pause):
+            part = self._stretch()
+            if isinstance(part, str):
+                self.health = Health(text=part)
+                pause = _LEAST
+                continue
+            answer = self._examined(door, part, folder / "live.csv")
+            if answer is None:
+                return
+            self.take(answer, part)
+            pause = min(max(_LEAST, _SHARE * answer.seconds), _MOST)
+
+    def _examined(self, door: Connection, part: Stretch, path: Path) -> Health | None:
+        """Return the answer on a stretch; None where the bench closes meanwhile."""
+        try:
+            write_stretch(path, part, self._actuator, self._fidelity, force=True)
+        except ElevonError as error:
+            return Health(text=str(error))
+        door.send((str(path), self._actuator, self._baselines, self._mission))
+        while not door.poll(0.05):
+            if self._stop.is_set():
+                return None
+        answer: Health = door.recv()
+        return answer
+
+    def take(self, answer: Health, part: Stretch) -> None:
+        """Keep an answer, with when: what was looked at, and since when it is not healthy."""
+        span = (float(part.time[0]), float(part.time[-1]))
+        since = None
+        if answer.status not in ("waiting", "healthy"):
+            since = span[1] if self.health.since is None else self.health.since
+        self.health = replace(answer, stretch=span, since=since)

@@ -1,0 +1,153 @@
+"""The simulation's own thread: real time times a factor, actions between two samples."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time as clock
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, TypeVar
+
+from elevon.errors import RangeError
+from elevon.live.ring import SampleRing
+
+if TYPE_CHECKING:
+    from elevon.live.unit import Source
+
+
+Value = TypeVar("Value")
+SLOWEST, FASTEST = 0.1, 100.0
+KEPT = 120.0  # s of samples at hand: plots, spectrum, health
+_WAKE = 0.01  # s between two looks at the clock: a third of a frame
+_LATE = 0.2  # s of delay that is caught up; what is more is given up, the factor falls
+_BUSY = 0.05  # s of work after which actions are looked for again
+
+
+class LiveLoop:
+    """Runs a source against the clock and keeps its last samples.
+
+    Parameters
+    ----------
+    source : Source
+        What is shown.
+    factor : float
+        Simulated time over wall time.
+    """
+
+    def __init__(self, source: Source, factor: float = 1.0) -> None:
+        self.source = source
+        self.ring = SampleRing(source.names, int(KEPT / source.period))
+        self.listener: Callable[[float, Sequence[float]], None] | None = None
+        self.paused = False
+        self.reached_factor = 0.0
+        self._factor = check_factor(factor)
+        self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="simulation", daemon=True)
+        self._rebase()
+
+    @property
+    def factor(self) -> float:
+        """The factor asked for; what is reached stands in `reached_factor`."""
+        return self._factor
+
+    def set_factor(self, factor: float) -> None:
+        """Ask for another factor; of the loop's own thread."""
+        self._factor = check_factor(factor)
+        self._rebase()
+
+    def pause(self, paused: bool) -> None:
+        """Let time stand, or go on; of the loop's own thread."""
+        self.paused = paused
+        self._rebase()
+
+    def start(self) -> None:
+        """Begin."""
+        self.ring.append(self.source.time, self.source.step())
+        self._rebase()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End, and wait for it."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def call(self, work: Callable[[], Value], timeout: float = 10.0) -> Value:
+        """Do something between two samples, on the loop's thread; return what it returns."""
+        if not self._thread.is_alive():
+            return work()
+        answer: Future[Value] = Future()
+
+        def do() -> None:
+            try:
+                answer.set_result(work())
+            except BaseException as error:  # noqa: BLE001 - it belongs to whoever asked
+                answer.set_exception(error)
+
+        self._todo.put(do)
+        return answer.result(timeout)
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self._actions()
+            if self.paused:
+                self._stop.wait(_WAKE)
+            elif not self._behind():
+                self._measure()
+                self._stop.wait(_WAKE)
+
+    def _actions(self) -> None:
+        while True:
+            try:
+                self._todo.get_nowait()()
+            except queue.Empty:
+                return
+
+    def _behind(self) -> bool:
+        """Go on to the clock's instant; True where it is not reached yet."""
+        begin = clock.perf_counter()
+        while self.source.time < self._target():
+            self._sample()
+            if clock.perf_counter() - begin > _BUSY:
+                if self._target() - self.source.time > _LATE * self._factor:
+                    self._rebase(measured=True)
+                self._measure()
+                return True
+        return False
+
+    def _sample(self) -> None:
+        before = self.source.time
+        values = self.source.step()
+        time = self.source.time
+        if time <= before:  # it stands: tripped, diverged or ended
+            self._rebase()
+            self._stop.wait(_WAKE)
+            self._base_wall = clock.perf_counter()
+            return
+        self.ring.append(time, values)
+        if self.listener is not None:
+            self.listener(time, values)
+
+    def _target(self) -> float:
+        return self._base + (clock.perf_counter() - self._base_wall) * self._factor
+
+    def _rebase(self, *, measured: bool = False) -> None:
+        if not measured:
+            self._mark = (clock.perf_counter(), self.source.time)
+        self._base, self._base_wall = self.source.time, clock.perf_counter()
+
+    def _measure(self) -> None:
+        wall, time = self._mark
+        now = clock.perf_counter()
+        if now - wall > 0.5:
+            self.reached_factor = (self.source.time - time) / (now - wall)
+            self._mark = (now, self.source.time)
+
+
+def check_factor(factor: float) -> float:
+    """Return a factor; `RangeError` outside 0.1 to 100."""
+    if not SLOWEST <= factor <= FASTEST:
+        raise RangeError(f"factor {factor:g}: must be {SLOWEST:g} to {FASTEST:g}")
+    return factor

@@ -1,0 +1,155 @@
+"""The page with a recorded session in it, for documentation: nothing runs behind it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elevon.errors import InputError
+from elevon.files import check_output, write_bytes, write_text
+from elevon.live.app import asset
+from elevon.live.health import examine
+from elevon.live.trace import write_stretch
+from elevon.plain import plain
+from elevon.results import finite
+
+if TYPE_CHECKING:
+    from elevon.arrays import Floats
+    from elevon.live.bench import LiveBench
+    from elevon.live.replay import LogReplay
+
+SECONDS = 24.0
+"""Of a recorded session."""
+_BROKEN = 10.0  # s at which the fault begins
+_EVERY = 4  # samples to one that is stored
+_STATES = 2.0  # s between two states
+#: The modules in the order in which they use each other, joined into one script.
+_MODULES = ("dom", "source", "store", "plots", "picture", "command", "sliders", "main")
+#: What is done in the session, by wiring: the command, the fault.
+_SHOWS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "rotary": (
+        {"terms": [{"kind": "sine", "amplitude": "6 deg", "bias": "10 deg",
+                    "frequency": "0.5 Hz"}]},
+        {"backlash@transmission": "0.5 deg"},
+    ),
+    "ballscrew": (
+        {"terms": [{"kind": "sine", "amplitude": "30 mm", "frequency": "0.25 Hz"}]},
+        {"backlash@transmission": "0.2 mm"},
+    ),
+    "landing_gear": (
+        {"mode": "gear", "steps": [{"time": 0.5, "action": "extend"},
+                                   {"time": 12, "action": "retract"}]},
+        {"friction_growth@screw": 300.0},
+    ),
+}  # fmt: skip
+
+
+def write_static(bench: LiveBench | LogReplay, folder: Path, *, force: bool = False) -> list[Path]:
+    """Write the page and a session of 24 s; return the files.
+
+    Raises
+    ------
+    InputError
+        A log: it is replayed by `elevon live`.
+    OutputExistsError
+        A file that is there, without `force`.
+    """
+    from elevon.live.bench import LiveBench
+
+    if not isinstance(bench, LiveBench):
+        raise InputError("--static: records a session of an actuator, not of a log")
+    names = (
+        "index.html",
+        "page.js",
+        "session.js",
+        "style.css",
+        "uplot.js",
+        "uplot.css",
+        "icon.svg",
+    )
+    for name in names:
+        check_output(folder / name, force=force)
+    session = json.dumps(finite(plain(recorded_session(bench))), allow_nan=False)
+    texts = {"index.html": _page(), "page.js": _script(),
+             "session.js": f"window.elevonSession = {session};\n"}  # fmt: skip
+    folder.mkdir(parents=True, exist_ok=True)
+    written = [write_text(folder / name, text, force=force) for name, text in texts.items()]
+    for name in names[3:]:
+        found = asset(name)
+        assert found is not None
+        written.append(write_bytes(folder / name, found[0], force=force))
+    return written
+
+
+def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, Any]:
+    """Run a bench without a clock, break it on the way; return what the page needs of it."""
+    unit = bench.unit
+    command, fault = _SHOWS[unit.actuator.wiring]
+    times, rows, states = [], [], []
+    broken, noted = False, -np.inf
+    bench.panel.run(unit, command)
+    bench.loop.ring.append(unit.time, unit.values())
+    while unit.time < seconds:
+        if not broken and unit.time >= _BROKEN:
+            bench.act({"fault": fault})
+            broken = True
+        values = unit.step()
+        bench.loop.ring.append(unit.time, values)
+        if len(rows) == 0 or bench.loop.ring.written % _EVERY == 0:
+            times.append(unit.time)
+            rows.append(values)
+        if unit.time - noted >= _STATES:
+            noted = unit.time
+            states.append(_state(bench))
+    table = np.asarray(rows, dtype=np.float64)
+    return {
+        "model": bench.describe(),
+        "times": _packed(np.asarray(times), "<f8"),
+        "values": {name: _packed(table[:, i], "<f4") for i, name in enumerate(unit.names)},
+        "states": states,
+    }
+
+
+def _state(bench: LiveBench) -> dict[str, Any]:
+    part = bench.stretch()
+    if not isinstance(part, str):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "live.csv"
+            write_stretch(path, part, bench.unit.actuator, bench.unit.fidelity)
+            bench.watch.take(examine(str(path), bench.unit.actuator, (), None), part)
+    state = bench.state()
+    return {**state, "control": None, "factor": 1.0}
+
+
+def _packed(values: Floats, kind: str) -> str:
+    return base64.b64encode(values.astype(kind).tobytes()).decode("ascii")
+
+
+def _text(name: str) -> str:
+    found = asset(name)
+    assert found is not None, name
+    return found[0].decode("utf-8")
+
+
+def _script() -> str:
+    """Return the modules as one script: a page that is opened from a disk loads no modules."""
+    joined = "\n".join(_text(f"{name}.js") for name in _MODULES)
+    joined = re.sub(r"^import .*?;\n", "", joined, flags=re.M)
+    joined = re.sub(r"^export (?=const|function|class|async)", "", joined, flags=re.M)
+    return f"(() => {{\n{joined}\n}})();\n"
+
+
+def _page() -> str:
+    page = _text("index.html").replace('"page/', '"').replace(' type="module"', " defer")
+    page = page.replace('src="main.js"', 'src="page.js"')
+    return page.replace(
+        '<script src="page.js"',
+        '<meta name="session" content="session.js">\n<script src="session.js" defer></script>\n'
+        '<script src="page.js"',
+    )

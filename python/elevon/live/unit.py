@@ -1,0 +1,359 @@
+"""An actuator that is moved by hand: its session, and what may be done to it while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, Protocol
+
+from elevon.bench.rig import moved
+from elevon.documents import Document, validated
+from elevon.errors import ArgumentTypeError, DivergedError, InputError, unknown
+from elevon.faults import Fault, catalogue, check_together
+from elevon.live.limits import InputRange, check_value, check_waveform, input_ranges
+from elevon.parameters.records import wirings
+from elevon.scenario import Command, Terms
+from elevon.scenario.compile import port_units, signal_records
+from elevon.session import Session
+from elevon.units import parse_quantity, shown_unit
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
+
+PERIOD = 0.0025  # s between two samples: the rate of a drive's trace
+_FILTERED = ("current_q_meas", "current_d_meas", "voltage_q_meas")
+
+
+class Source(Protocol):
+    """What the bench shows: an actuator that runs, or a log that is played."""
+
+    names: tuple[str, ...]
+    period: float
+
+    @property
+    def time(self) -> float:
+        """Instant that is reached [s]."""
+        ...
+
+    @property
+    def status(self) -> tuple[str, str]:
+        """``ok``, ``tripped``, ``diverged`` or ``ended``, and why."""
+        ...
+
+    def step(self) -> Sequence[float]:
+        """Go on by one period; return the value of each signal."""
+        ...
+
+
+def sample_period(step: float) -> float:
+    """Return the whole number of solver steps [s] that is nearest to the drive's rate."""
+    return max(1, round(PERIOD / step)) * step
+
+
+class LiveUnit:
+    """An actuator in a session; what is done to it acts at the instant that is reached.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        As it is when it is healthy.
+    fidelity : str
+        ``high`` or ``low``.
+    mode : str, optional
+        What the command demands; default: the first that the wiring takes.
+    seed : int
+        Of the random numbers.
+    """
+
+    def __init__(
+        self,
+        actuator: Actuator,
+        *,
+        fidelity: str = "high",
+        mode: str | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.actuator, self.fidelity, self.seed = actuator, fidelity, seed
+        self.mode: str = mode or wirings()[actuator.wiring]["modes"][0]
+        self.faults: dict[str, Fault] = {}
+        self._begun = 0.0  # the session's start on the bench's clock
+        self._actions: list[tuple[float, float]] = []
+        self._last_action = 0.0
+        self.given: Mapping[str, Any] | None = None
+        self.given_at = 0.0
+        self.inputs: dict[str, Any] = {}
+        self.changed_at = 0.0
+        self._session = self._begin(actuator, {})
+        self._look()
+        self.names = tuple(name for name in self._session.names if self._carried(name))
+        self.period = sample_period(self._session.step)
+
+    @property
+    def time(self) -> float:
+        """Instant that is reached [s]."""
+        return self._time
+
+    @property
+    def status(self) -> tuple[str, str]:
+        """``ok``, ``tripped`` or ``diverged``, and why."""
+        return self._status
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The SI unit of each signal."""
+        known = signal_records(self.actuator.wiring, self.fidelity)
+        units = {name: str(known[name]["unit"] or "1") for name in self.names}
+        units["command"] = port_units(self.mode, self.actuator.wiring)["command"]
+        return units
+
+    @property
+    def ranges(self) -> dict[str, InputRange]:
+        """Within which each input may be set."""
+        return input_ranges(self.actuator, self.mode)
+
+    @property
+    def now(self) -> Actuator:
+        """The actuator with the parameters that were set."""
+        return self._session.actuators[0]
+
+    def step(self) -> Sequence[float]:
+        """Go on by one sample; return the value of each signal.
+
+        One that has diverged or tripped stands; its time goes on no more.
+        """
+        self._due()
+        if self.status[0] == "ok":
+            with suppress(DivergedError):  # its status tells
+                self._session.advance(self.period)
+            self._look()
+        return self.values()
+
+    def values(self) -> list[float]:
+        """Return the signals as they stand."""
+        return list(self._session.read(*self.names).values())
+
+    def command(self, given: Mapping[str, Any]) -> None:
+        """Set the command, as in a scenario file, in time from now on.
+
+        Raises
+        ------
+        InputError
+            What a scenario refuses; a value that the bench does not take.
+        """
+        read = self.check_command(given)
+        if read.mode != self.mode:
+            self._change_mode(read.mode)
+        if read.mode == "gear":
+            self._sequence(read)
+        else:
+            self._set_terms("command", read)
+        self.given = {"mode": read.mode, **given}
+        self.given_at = self.time
+
+    def check_command(self, given: Mapping[str, Any]) -> Command:
+        """Return a command that the bench takes; raises as `command`, and changes nothing."""
+        read = validated(Command, {"mode": self.mode, **given}, Document("command", "", {}))
+        modes = wirings()[self.actuator.wiring]["modes"]
+        if read.mode not in modes:
+            raise unknown("mode", read.mode, modes, "command")
+        if read.mode == "gear":
+            self._numbers(read)
+        else:
+            check_waveform("command", read, input_ranges(self.actuator, read.mode)["command"])
+        return read
+
+    def hold(self) -> None:
+        """Let the command stand where the output stands: no motion, no torque asked for."""
+        if self.mode == "gear":
+            self._act("stop")
+        else:
+            position = self._session.read("output_position")["output_position"]
+            self._session.set(command=position if self.mode == "position" else 0.0)
+        self.given, self.given_at = None, self.time
+
+    def ramp_home(self, seconds: float) -> None:
+        """Bring the output to zero in a time [s]."""
+        start = self._session.read("output_position")["output_position"]
+        ramp = {"kind": "ramp", "initial": start, "slope": -start / seconds, "end": seconds}
+        self.command({"mode": self.mode, "terms": [ramp]})
+
+    def set(self, name: str, value: Any) -> None:
+        """Set an input (a number, a text with a unit, a waveform) or a parameter by its path.
+
+        Raises
+        ------
+        InputError
+            No such input or parameter, a value that the bench or the model does not take.
+        """
+        ranges = self.ranges
+        if name == "command":
+            self.command({"terms": [{"kind": "constant", "value": value}]})
+        elif name in ranges:
+            self._input(name, value, ranges[name])
+            self.inputs[name], self.changed_at = value, self.time
+        elif "." in name:
+            if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+                raise ArgumentTypeError(f"{name}: {value!r:.60} is no value")
+            self._announced(lambda: self._session.set_parameter(name, value), tunable=[name])
+            self.inputs[name], self.changed_at = value, self.time
+        else:
+            raise unknown("input", name, [*ranges, *self.actuator.parameters], "set")
+
+    def inject(self, name: str, given: Any) -> None:
+        """Set the severity of a fault, ``KIND@PLACE``; zero clears it.
+
+        Parameters
+        ----------
+        name : str
+            As in the catalogue.
+        given : float, str, mapping or None
+            Severity in the catalogue's unit, or with one; a mapping holds ``severity`` and the
+            fault's attributes.
+
+        Raises
+        ------
+        InputError
+            No such fault, a severity out of range.
+        """
+        kind, _, place = name.partition("@")
+        data = dict(given) if isinstance(given, Mapping) else {"severity": given or 0.0}
+        severity = data.get("severity", 0.0)
+        if isinstance(severity, bool) or not isinstance(severity, (int, float, str)):
+            raise ArgumentTypeError(f"{name}: {severity!r:.60} is no severity")
+        fault = Fault.from_dict({"kind": kind, "place": place, **data}, name)
+        resolved = fault.resolved(self.actuator.wiring, self.fidelity, name)
+        others = [other for key, other in self.faults.items() if key != name]
+        if resolved["severity"] != 0.0:
+            check_together([*others, fault])
+        attributes = dict(fault.attributes)
+        self._announced(
+            lambda: self._session.set_fault(name, severity, **attributes), faults=[name]
+        )
+        self.faults.pop(name, None)
+        if resolved["severity"] != 0.0:
+            self.faults[name] = fault
+
+    def restart(self) -> None:
+        """Begin anew from rest, with the faults and parameters as they are; time goes on."""
+        self._anew({})
+
+    def _announced(self, change: Any, **what: list[str]) -> None:
+        """Make a change, with the equations that it needs."""
+        announce = getattr(self._session, "announce", None)
+        if announce is not None:
+            announce(**what)
+        change()
+
+    def _begin(self, actuator: Actuator, initial: Mapping[str, float]) -> Session:
+        scenario = {"duration": 1.0, "command": {"mode": self.mode}, "initial": dict(initial)}
+        known = signal_records(actuator.wiring, self.fidelity)
+        session = Session(
+            actuator,
+            scenario,
+            fidelity=self.fidelity,
+            seed=self.seed,
+            faults=self._expected(),
+            signals=[name for name in _FILTERED if name in known],
+        )
+        for name, fault in self.faults.items():
+            session.set_fault(name, fault.severity, **dict(fault.attributes))
+        if self.mode == "position" and initial.get("output_position"):
+            session.set(command=initial["output_position"])
+        ports = port_units(self.mode, actuator.wiring)
+        for name, value in self.inputs.items():
+            if name in ports:
+                session.set(**{name: value})
+        return session
+
+    def _expected(self) -> list[str]:
+        if hasattr(Session, "announce"):
+            return list(self.faults)
+        return fault_names(self.actuator.wiring, self.fidelity)
+
+    def _change_mode(self, mode: str) -> None:
+        from elevon import _core
+
+        self.mode = mode
+
+        names = [n for n in _core.initial(self.actuator.wiring, self.fidelity) if n in self.names]
+        self._anew(self._session.read(*names))
+
+    def _anew(self, initial: Mapping[str, float]) -> None:
+        begun = self.time
+        self._session = self._begin(self.now, initial)
+        self._begun, self._actions = begun, []
+        self._look()
+
+    def _look(self) -> None:
+        """Note what other threads read: a session bears one at a time."""
+        self._time = self._begun + self._session.time
+        self._status = self._session.state_of(0)
+
+    def _carried(self, name: str) -> bool:
+        try:
+            self._session.read(name)
+        except InputError:
+            return False
+        return True
+
+    def _input(self, name: str, value: Any, span: InputRange) -> None:
+        if isinstance(value, Mapping):
+            given = value if "terms" in value else {"terms": [value]}
+            read = validated(Terms, given, Document(name, "", {}))
+            check_waveform(name, read, span)
+            self._set_terms(name, read)
+            return
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise ArgumentTypeError(f"{name}: {value!r:.60} is no value")
+        number = parse_quantity(value, span.unit, name, shown_unit(span.unit))
+        check_value(name, number, span)
+        self._session.set(**{name: number})
+
+    def _set_terms(self, port: str, sum_: Terms) -> None:
+        """Let a sum of waveforms act, in time from now on."""
+        plain = [term.model_dump(exclude_unset=True, mode="json") for term in sum_.terms]
+        terms = [moved(term, self._session.time) for term in plain]
+        self._session.set(**{port: {"terms": terms}})
+
+    def _sequence(self, command: Command) -> None:
+        now = self._session.time
+        self._actions = [(now + later, number) for later, number in self._numbers(command)]
+        self._due()
+
+    def _numbers(self, command: Command) -> list[tuple[float, float]]:
+        """Return the actions of a sequence: seconds from now, and the number of each."""
+        actions: list[str] = wirings()[self.actuator.wiring]["actions"]
+        out: list[tuple[float, float]] = []
+        for step in command.steps:
+            if step.action not in actions:
+                raise unknown("action", step.action, actions, "command.steps")
+            seconds = parse_quantity(step.time, "s", "command.steps: time")
+            if seconds < (out[-1][0] if out else 0.0):
+                raise InputError(f"command.steps: time = {step.time}: times must rise from 0 s")
+            out.append((seconds, float(actions.index(step.action))))
+        return out
+
+    def _due(self) -> None:
+        while self._actions and self._actions[0][0] <= self._session.time + 1e-9:
+            self._numbered(self._actions.pop(0)[1])
+
+    def _act(self, action: str) -> None:
+        self._actions = []
+        self._numbered(float(wirings()[self.actuator.wiring]["actions"].index(action)))
+
+    def _numbered(self, number: float) -> None:
+        """Give an action; the same one again is a round higher, else it would not be seen."""
+        rounds = len(wirings()[self.actuator.wiring]["actions"])
+        self._last_action = number + rounds if self._last_action == number else number
+        self._session.set(command=self._last_action)
+
+
+def fault_names(wiring: str, fidelity: str) -> list[str]:
+    """Return ``KIND@PLACE`` of every fault that a model has."""
+    return [
+        f"{record.kind}@{place}"
+        for record in catalogue(wiring)
+        if fidelity in record.fidelities
+        for place in record.places
+    ]

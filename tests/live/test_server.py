@@ -1,0 +1,224 @@
+"""What the server promises: its first line, /state, /act, its limits, who may speak to it."""
+
+import json
+
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from elevon.cli import main
+from tests.live.serving import SINE, bench
+
+STREAM = "stream"
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("live")
+    with bench("--fidelity", "low", "--factor", "10", folder=folder) as server:
+        yield server
+
+
+def _socket(live, **options):
+    return connect(live.address.replace("http", "ws") + STREAM, compression=None, **options)
+
+
+def test_the_first_line_is_the_address(live):
+    assert live.line.startswith("live at http://127.0.0.1:")
+    assert live.line.endswith("/\n")
+
+
+def test_a_port_that_is_taken_is_wrong_input(live, capsys):
+    port = live.address.rstrip("/").rpartition(":")[2]
+    assert main(["live", "--port", port, "--fidelity", "low", "--no-browser"]) == 2
+    streams = capsys.readouterr()
+    assert port in streams.err
+    assert streams.out == ""
+
+
+def test_state_has_time_factor_values_and_health(live):
+    state = live.state()
+    assert state["time"] >= 0.0
+    assert isinstance(state["factor"], float)
+    assert {"output_position", "motor_speed"} <= state["values"].keys()
+    assert {"status", "faults"} <= state["health"].keys()
+
+
+def test_a_command_moves_the_output(live):
+    status, answer = live.act(command=SINE)
+    assert status == 200
+    begin = answer["time"]
+    live.until(lambda state: state["time"] > begin + 1.0 and state["values"]["motor_speed"] != 0.0)
+
+
+def test_a_fault_and_a_setting_are_taken(live):
+    status, _ = live.act(fault={"backlash@transmission": "0.5 deg"}, set={"output": "5 N m"})
+    assert status == 200
+    state = live.state()
+    assert state["injected"] == {"backlash@transmission": "0.5 deg"}
+    assert state["inputs"]["output"] == "5 N m"
+    live.act(fault={"backlash@transmission": 0}, set={"output": 0})
+    assert live.state()["injected"] == {}
+
+
+@pytest.mark.parametrize(
+    ("message", "part"),
+    [
+        ({"comand": {}}, "command"),
+        ({"command": {"terms": [{"kind": "sin"}]}}, "sine"),
+        ({"command": {"terms": [{"kind": "constant", "value": "2000 deg"}]}}, "bench takes"),
+        ({"command": {"mode": "gear"}}, "gear"),
+        ({"fault": {"backlsh@transmission": 1}}, "backlash"),
+        ({"fault": {"backlash@transmission": "5 rad"}}, "outside"),
+        ({"fault": {"backlash@transmission": True}}, "severity"),
+        ({"set": {"supply": "10 kV"}}, "bench takes"),
+        ({"set": {"supply": "10 m"}}, "V"),
+        ({"set": {"friction.statc": 1}}, "friction.static"),
+        ({"set": []}, "table"),
+        ({"record": 7}, "record"),
+        ({"factor": 1e6}, "100"),
+        ({"panel": "mve"}, "move"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(live, message, part):
+    status, answer = live.act(**message)
+    assert status == 400
+    assert part in answer["error"]
+
+
+@pytest.mark.parametrize(
+    "body", [b"", b"{", b"[]", b"\xff\xfe", b'{"factor": NaN}', b'{"factor": 1e999}', b"[" * 9000]
+)
+def test_what_is_no_message_is_refused(live, body):
+    assert live.request("act", body)[0] == 400
+
+
+def test_a_long_message_is_refused(live):
+    assert live.request("act", b'{"set": "' + b"x" * 70_000 + b'"}')[0] == 400
+
+
+def test_interlocks_of_the_watch_table(live):
+    live.act(panel="reset")
+    status, answer = live.act(panel="move")
+    assert (status, answer["error"]) == (400, "panel: move: enable first")
+    live.act(panel="enable", block=SINE)
+    assert "home first" in live.act(panel="move")[1]["error"]
+    live.act(panel="home")
+    live.until(lambda state: state["panel"]["homed"])
+    assert live.act(panel="move")[0] == 200
+    assert live.state()["panel"]["moving"]
+    live.act(panel="stop")
+    assert not live.state()["panel"]["moving"]
+
+
+def test_another_origin_or_host_is_refused(live):
+    for headers in ({"Origin": "http://evil.example"}, {"Host": "evil.example"}):
+        assert live.request("state", headers=headers)[0] == 403
+        assert live.request("act", {"pause": True}, headers)[0] == 403
+    with pytest.raises(InvalidStatus):
+        _socket(live, origin="http://evil.example")
+
+
+def test_the_page_may_run_no_foreign_script(live):
+    status, _, headers = live.request("")
+    assert status == 200
+    assert "script-src 'self'" in headers["content-security-policy"]
+    assert live.request("page/../bench.py")[0] == 404
+    assert live.request("page/uplot.js")[0] == 200
+
+
+def test_a_recording_is_what_a_drive_writes(live):
+    from elevon.logs.read import read_log
+
+    live.act(command=SINE)
+    assert live.act(record=True)[0] == 200
+    assert live.act(record=True)[0] == 400
+    begin = live.state()["time"]
+    live.until(lambda state: state["time"] > begin + 3.0)
+    _, answer = live.act(record=False)
+    log = read_log(answer["files"][0])
+    assert log.has("output_position", "motor_speed", "speed_ref", "torque_current")
+    assert log.note.command is not None or log.note.waveform == "sine"
+    name = answer["files"][0].rpartition("/")[2]
+    assert live.request(f"files/{name}")[0] == 200
+    assert live.request("files/other.csv")[0] == 404
+    assert live.act(record=False)[0] == 400
+
+
+def test_what_was_done_is_a_scenario(live, tmp_path):
+    from elevon import Scenario
+
+    live.act(restart=True)
+    live.act(command=SINE, fault={"friction@transmission": 0.5}, set={"output": "4 N m"})
+    _, answer = live.act(save=True)
+    path = tmp_path / "done.toml"
+    path.write_text(answer["scenario"])
+    scenario = Scenario.load(path)
+    assert scenario.command.terms[0].kind == "sine"
+    assert scenario.fault[0].kind == "friction"
+    assert scenario.loads.output.terms[0].arguments["final"] == "4 N m"
+    assert answer["steps"][-1]["fault"] == {"friction@transmission": 0.5}
+    live.act(restart=True, fault={"friction@transmission": 0})
+
+
+def _viewer(socket):
+    return json.loads(socket.recv())["viewer"]
+
+
+def test_one_viewer_at_a_time_has_control(live):
+    with _socket(live) as first, _socket(live) as second:
+        one, two = _viewer(first), _viewer(second)
+        assert live.act({"X-Viewer": one}, pause=False)[1]["control"]
+        assert live.act({"X-Viewer": two}, pause=False)[0] == 409
+        assert live.act(pause=False)[0] == 409
+        live.act({"X-Viewer": one}, release=True)
+        assert live.act(pause=False)[0] == 200
+        assert live.act({"X-Viewer": two}, pause=False)[0] == 200
+    live.until(lambda state: state["control"] == {"held": False, "viewers": 0})
+
+
+def test_snapshots_hold_the_signals_that_were_chosen(live):
+    import struct
+
+    with _socket(live) as socket:
+        _viewer(socket)
+        socket.send(json.dumps({"watch": ["motor_speed", "none", "command"], "choice": 7}))
+        while True:
+            data = socket.recv(timeout=30)
+            if isinstance(data, bytes):
+                time, _, wanted, choice, rows, columns = struct.unpack_from("<ddfIII", data)
+                if choice == 7 and rows:
+                    break
+        assert (columns, wanted) == (2, 10.0)
+        assert len(data) == 32 + rows * (8 + 4 * columns)
+        assert time > 0.0
+
+
+def test_malformed_messages_leave_the_server_up(live):
+    import random
+
+    rng = random.Random(30)
+    with _socket(live) as socket:
+        _viewer(socket)
+        for _ in range(200):
+            text = "".join(rng.choice('{}[]":,0e-."watchcommandfault ') for _ in range(40))
+            socket.send(rng.choice([text, text.encode(), '{"watch": 3}', '{"factor": "x"}']))
+        errors = 0
+        while errors < 200:
+            data = socket.recv(timeout=30)
+            errors += isinstance(data, str) and "error" in data
+    assert live.state()["time"] > 0.0
+
+
+def test_a_viewer_that_hangs_slows_nobody(live):
+    hanging = _socket(live, max_queue=1)
+    try:
+        _viewer(hanging)
+        with _socket(live) as socket:
+            _viewer(socket)
+            begin = live.state()["time"]
+            for _ in range(20):
+                socket.recv(timeout=30)
+            assert live.state()["time"] > begin
+    finally:
+        hanging.socket.close()
