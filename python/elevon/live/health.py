@@ -25,7 +25,7 @@ from elevon.plain import Plain
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
 
 
 FALSE_ALARM = 0.005

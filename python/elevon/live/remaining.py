@@ -8,7 +8,7 @@ from elevon.errors import ElevonError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.bymodel.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
 
 
 def remaining_life(answer: Diagnosis, actuator: Actuator, mission: str) -> str:

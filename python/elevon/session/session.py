@@ -263,7 +263,9 @@ class Session:
         self.unit(port)
         if isinstance(value, Mapping):
             sums = [self._terms(port, value, units[port]) for units in self._units]
-            return lambda: all(self._core.set_input(run, port, sum_) for run, sum_ in enumerate(sums))
+            return lambda: all(
+                self._core.set_input(run, port, sum_) for run, sum_ in enumerate(sums)
+            )
         given = zip(one_each(value, len(self), port), self._units, strict=True)
         read = [quantity(each, units[port] or "1", port) for each, units in given]
         return lambda: bool(self._core.set_values(port, read))
