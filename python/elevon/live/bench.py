@@ -13,7 +13,7 @@ import numpy as np
 from elevon.errors import ArgumentTypeError, InputError, unknown
 from elevon.live.describe import description
 from elevon.live.health import HealthWatch
-from elevon.live.journal import Journal
+from elevon.live.journal import Journal, moved_command
 from elevon.live.loop import LiveLoop
 from elevon.live.panel import WatchTable
 from elevon.live.recorder import Recorder, free_name
@@ -293,22 +293,6 @@ class LiveBench:
         if speed[late].max() > 0.01 * max(speed.max(), 1.0):
             return "waiting for the end of the motion"
         return self._part(time, signals)
-
-
-def moved_command(given: Mapping[str, Any], start: float) -> dict[str, Any]:
-    """Return a command with its instants moved to a start [s], as a note states it."""
-    from elevon.bench.rig import moved
-    from elevon.units import parse_quantity
-
-    out = dict(given)
-    if "terms" in given:
-        out["terms"] = [moved(dict(term), start) for term in given["terms"]]
-    if "steps" in given:
-        out["steps"] = [
-            {**step, "time": max(0.0, parse_quantity(step["time"], "s", "time") + start)}
-            for step in given["steps"]
-        ]
-    return out
 
 
 def _length(given: Mapping[str, Any]) -> float:

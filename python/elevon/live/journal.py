@@ -6,7 +6,9 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from elevon.bench.rig import moved
 from elevon.errors import InputError
+from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -15,6 +17,19 @@ if TYPE_CHECKING:
 _MOST = 2000  # entries: a slider that is moved for minutes
 _QUIET = ("record", "save", "factor", "pause")  # nothing of these acts on the actuator
 _LOADS = ("brake", "shaft", "output", "weight_on_wheels")
+
+
+def moved_command(given: Mapping[str, Any], start: float) -> dict[str, Any]:
+    """Return a command with its instants moved to a start [s], as a note states it."""
+    out = dict(given)
+    if "terms" in given:
+        out["terms"] = [moved(dict(term), start) for term in given["terms"]]
+    if "steps" in given:
+        out["steps"] = [
+            {**step, "time": max(0.0, parse_quantity(step["time"], "s", "time") + start)}
+            for step in given["steps"]
+        ]
+    return out
 
 
 class Journal:
@@ -116,15 +131,11 @@ class _Writer:
         if len(given) > 1:
             self._remarks.append(f"{len(given)} commands followed each other; the last one is here")
         at, last = given[-1]
-        from elevon.live.bench import moved_command
-
         for term in moved_command(last, at).get("terms", ()):
             lines += ["", "[[command.terms]]", *_keys(term)]
         return [*lines, ""]
 
     def _steps(self, given: list[tuple[float, Any]]) -> list[str]:
-        from elevon.live.bench import moved_command
-
         lines = ["[command]", 'mode = "gear"']
         for at, command in given:
             for step in moved_command(command, at).get("steps", ()):
