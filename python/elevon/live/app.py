@@ -94,10 +94,10 @@ class LiveApp:
         reason = Guard(self.guard.host).refuses(request.headers, "")
         if reason is not None:
             return _answer({"error": reason}, 403)
-        found = asset(request.path_params.get("name", "index.html"))
-        if found is None:
+        file = asset(request.path_params.get("name", "index.html"))
+        if file is None:
             return _answer({"error": "no such page"}, 404)
-        data, kind = found
+        data, kind = file
         return Response(data, media_type=kind, headers=_HEADERS)
 
     async def _model(self, request: Request) -> Response:
@@ -208,10 +208,10 @@ def asset(name: str) -> tuple[bytes, str] | None:
     if ending not in _TYPES or "/" in name or name.startswith("."):
         return None
     if name in vendored:
-        found = files("elevon.report") / "vendor" / vendored[name]
+        file = files("elevon.report") / "vendor" / vendored[name]
     else:
-        found = files("elevon.live") / "page" / name
-    return (found.read_bytes(), _TYPES[ending]) if found.is_file() else None
+        file = files("elevon.live") / "page" / name
+    return (file.read_bytes(), _TYPES[ending]) if file.is_file() else None
 
 
 async def _body(request: Request) -> bytes:

@@ -254,9 +254,8 @@ class LiveBench:
 
     def _part(self, time: Any, signals: Mapping[str, Any]) -> Stretch:
         unit = self.unit
-        force = "load_force" if unit.actuator.wiring != "rotary" else None
-        output = unit.inputs.get("output", 0.0)
-        load = signals[force] if force in signals and output else np.zeros(len(time))
+        output, none = unit.inputs.get("output", 0.0), np.zeros(len(time))
+        load = signals.get("load_force", none) if output else none
         brake = signals.get("brake_torque")
         given = None
         if unit.given is not None:

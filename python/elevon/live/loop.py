@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Value = TypeVar("Value")
 SLOWEST, FASTEST = 0.1, 100.0
-KEPT = 120.0  # s of samples at hand: plots, spectrum, health
+SPAN = 120.0  # s of samples at hand: plots, spectrum, health
 _WAKE = 0.01  # s between two looks at the clock: a third of a frame
 _LATE = 0.2  # s of delay that is caught up; what is more is given up, the factor falls
 _BUSY = 0.05  # s of work after which actions are looked for again
@@ -37,7 +37,7 @@ class LiveLoop:
 
     def __init__(self, source: Source, factor: float = 1.0) -> None:
         self.source = source
-        self.ring = SampleRing(source.names, int(KEPT / source.period))
+        self.ring = SampleRing(source.names, int(SPAN / source.period))
         self.listener: Callable[[float, Sequence[float]], None] | None = None
         self.paused = False
         self.reached_factor = 0.0

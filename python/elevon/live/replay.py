@@ -70,7 +70,7 @@ class LogReplay:
         self.files: list[Path] = []
         self.health = Health(text="diagnosing the log")
         known = signal_records(actuator.wiring, "high")
-        by_role = {record["role"]: name for name, record in reversed(known.items())}
+        by_role = {record["role"]: name for name, record in reversed(list(known.items()))}
         names = {role: by_role.get(role) or role for role in log.channels}
         self._units = {names[role]: log.units.get(role) or "1" for role in names}
         signals = {names[role]: values for role, values in log.channels.items()}

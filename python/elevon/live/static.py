@@ -20,6 +20,8 @@ from elevon.plain import plain
 from elevon.results import finite
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from elevon.arrays import Floats
     from elevon.live.bench import LiveBench
     from elevon.live.replay import LogReplay
@@ -81,9 +83,9 @@ def write_static(bench: LiveBench | LogReplay, folder: Path, *, force: bool = Fa
     folder.mkdir(parents=True, exist_ok=True)
     written = [write_text(folder / name, text, force=force) for name, text in texts.items()]
     for name in names[3:]:
-        found = asset(name)
-        assert found is not None
-        written.append(write_bytes(folder / name, found[0], force=force))
+        content = asset(name)
+        assert content is not None
+        written.append(write_bytes(folder / name, content[0], force=force))
     return written
 
 
@@ -91,7 +93,9 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
     """Run a bench without a clock, break it on the way; return what the page needs of it."""
     unit = bench.unit
     command, fault = _SHOWS[unit.actuator.wiring]
-    times, rows, states = [], [], []
+    times: list[float] = []
+    rows: list[Sequence[float]] = []
+    states: list[dict[str, Any]] = []
     broken, noted = False, -np.inf
     bench.panel.run(unit, command)
     bench.loop.ring.append(unit.time, unit.values())
@@ -132,9 +136,9 @@ def _packed(values: Floats, kind: str) -> str:
 
 
 def _text(name: str) -> str:
-    found = asset(name)
-    assert found is not None, name
-    return found[0].decode("utf-8")
+    content = asset(name)
+    assert content is not None, name
+    return content[0].decode("utf-8")
 
 
 def _script() -> str:
