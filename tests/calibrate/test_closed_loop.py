@@ -1,7 +1,5 @@
 """Calibration in closed loop, on a linear actuator that is not in the project."""
 
-import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +18,6 @@ from elevon.calibrate.closed_loop.predict import held_out_errors, validate_loop
 from elevon.calibrate.closed_loop.refine import load_share, steps
 from elevon.calibrate.closed_loop.result import agreement
 from elevon.calibrate.door import calibrate as elevon_calibrate
-from elevon.cli.runner import run as elevon
 from elevon.errors import InputError, UnknownNameError
 from elevon.estimate.free import Free, inner
 from elevon.estimate.lanes import LaneChannel, Lanes, Point
@@ -376,35 +373,3 @@ def test_twelve_benches_and_their_intervals():
     far = {path: float(np.median(e)) for path, e in off.items()}
     assert max(far.values()) < 0.05, far
     assert 0.8 <= np.mean(hits) <= 0.97
-
-
-def write_csv(path, columns):
-    names = list(columns)
-    table = np.column_stack([columns[name] for name in names])
-    np.savetxt(path, table, delimiter=",", header=",".join(names), comments="", fmt="%.6g")
-
-
-@pytest.mark.long
-def test_the_four_documented_commands(tmp_path, monkeypatch, capsys):
-    """From a logger's file to a validated set; then a machine that has changed fails."""
-    root = Path(__file__).resolve().parents[2]
-    section = (
-        (root / "docs" / "calibration.md")
-        .read_text()
-        .split("## Logs with few channels")[1]
-        .split("\n## ")[0]
-    )
-    commands = [line[4:] for line in section.splitlines() if line.startswith("    elevon ")]
-    assert len(commands) == 4
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(root / "examples" / "linear-drive" / "drive.toml", tmp_path)
-    worn = replace(PID, dry=2.5 * PID.dry)
-    trials = {"squares": (PID, square), "sweep": (PID, sweep), "another": (PID, square)}
-    for seed, (name, (bench, wave)) in enumerate({**trials, "worn": (worn, square)}.items()):
-        write_csv(tmp_path / f"{name}.csv", log(bench, wave, 20.0, seed=seed))
-    for command in commands:
-        assert elevon([*command.split()[1:], "--json"]) == 0, command
-        document = json.loads(capsys.readouterr().out)
-    assert document["status"] == "pass"
-    checked = commands[-1].replace("another", "worn").split()[1:]
-    assert elevon([*checked, "--json"]) == 1

@@ -1,7 +1,7 @@
 """The recording: what a run, or a bench, has to say."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording.channel import Channel, in_si
+from elevon.recording.channel_set import ChannelSet
 from elevon.recording.clock import Clock
 from elevon.recording.header import plain
 from elevon.recording.roles import channel_of, roles_of
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 MAX_BYTES = 8 * 2**30
 
 
-class Recording:
+class Recording(ChannelSet):
     """Named channels on one or several clocks, with what is known about them.
 
     A simulated run and a measured log are the same type. Channels are found by name
@@ -69,24 +70,10 @@ class Recording:
         labels: Sequence[Any] | Mapping[str, Any] | None = None,
         final: Mapping[str, float] | None = None,
     ) -> None:
-        self._channels: dict[str, Channel] = {}
-        self.clocks: dict[str, Clock] = {}
-        for clock in clocks:
-            self._add_clock(clock)
-        seen: dict[str, str] = {}
-        for channel in channels:
-            other = seen.setdefault(channel.name.lower(), channel.name)
-            if channel.name in self._channels or other != channel.name:
-                raise InputError(f"channel {channel.name!r}: the name is given twice")
-            self._add_clock(channel.clock)
-            self._channels[channel.name] = channel
+        super().__init__(channels, clocks)
         self.meta: dict[str, Any] = plain(dict(meta or {}), "meta")
         self.labels: Any = plain(labels if labels is not None else [], "labels")
         self.final: dict[str, float] = plain(final or {}, "final")
-
-    def _add_clock(self, clock: Clock) -> None:
-        if self.clocks.setdefault(clock.name, clock) is not clock:
-            raise InputError(f"clock {clock.name!r}: two different clocks have this name")
 
     @classmethod
     def build(
@@ -141,16 +128,6 @@ class Recording:
         return cls(channels, clocks=[base], meta=meta, labels=labels)
 
     @property
-    def names(self) -> list[str]:
-        """Names of the channels, in recorded order."""
-        return list(self._channels)
-
-    @property
-    def channels(self) -> list[Channel]:
-        """The channels, in recorded order."""
-        return list(self._channels.values())
-
-    @property
     def status(self) -> str:
         """`ok`, `tripped`, `diverged`, `interrupted`; `measured` when nothing was simulated."""
         return str(self.meta.get("status", "measured"))
@@ -164,21 +141,6 @@ class Recording:
         """Return the channel that has a role; `InputError` where none does."""
         return channel_of(self, name)
 
-    def __getitem__(self, name: str) -> Channel:
-        try:
-            return self._channels[name]
-        except KeyError:
-            raise unknown("channel", str(name), self._channels, "recording") from None
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._channels
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._channels)
-
-    def __len__(self) -> int:
-        return len(self._channels)
-
     def __repr__(self) -> str:
         clocks = ", ".join(repr(clock) for clock in self.clocks.values())
         return f"<Recording {self.status}: {len(self)} channels on [{clocks}]>"
@@ -187,33 +149,6 @@ class Recording:
         from elevon.recording.notebook_card import recording_card
 
         return recording_card(self)
-
-    def _ipython_key_completions_(self) -> list[str]:
-        return self.names
-
-    def clock(self, name: str | None = None) -> Clock:
-        """Return a clock by name, or the only one.
-
-        Raises
-        ------
-        InputError
-            No such clock, or no name and several clocks.
-        """
-        if name is None and len(self.clocks) == 1:
-            return next(iter(self.clocks.values()))
-        if name is None:
-            raise InputError(
-                f"the recording has {len(self.clocks)} clocks; name one of "
-                f"{', '.join(map(repr, self.clocks)) or 'none'}"
-            )
-        if name not in self.clocks:
-            raise unknown("clock", name, self.clocks, "recording")
-        return self.clocks[name]
-
-    def on_clock(self, name: str | None = None) -> list[Channel]:
-        """Return the channels of one clock, in recorded order; errors as `clock`."""
-        clock = self.clock(name)
-        return [channel for channel in self._channels.values() if channel.clock is clock]
 
     def select(
         self, names: Iterable[str] | None = None, *, clock: str | None = None
