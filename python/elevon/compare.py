@@ -158,8 +158,6 @@ def default_scenario(actuator: Actuator) -> Scenario:
     InputError
         There is none of these.
     """
-    from elevon.scenario import Scenario
-
     data = (actuator.compare or {}).get("scenario") or actuator.default_scenario
     if data is None:
         data = _shipped(actuator.wiring)
@@ -169,7 +167,6 @@ def default_scenario(actuator: Actuator) -> Scenario:
 
 
 def _shipped(wiring: str) -> Mapping[str, Any] | None:
-    from elevon.actuator import Actuator
     from elevon.parameters.find import set_names
 
     sets = (Actuator.load(name) for name in set_names())

@@ -9,7 +9,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, default_scenario, default_start
 from elevon.errors import InputError, SimulationError
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.scenario import Scenario
 
 LOADS = {"as given": 0.0, "opposing": 1.0, "aiding": -1.0}
@@ -51,8 +51,6 @@ def compare_loads(
     InputError, SimulationError
         As `compare`; nothing says how large the load is.
     """
-    from elevon.progress import part
-
     default = scenario is None
     base = default_scenario(actuator) if scenario is None else scenario
     start = default_start(actuator, base, default=default) if start is None else start

@@ -8,13 +8,21 @@ from dataclasses import replace
 
 from elevon.actuator import Actuator
 from elevon.analysis.effects import Effects
-from elevon.bench.procedure import Procedure
-from elevon.bench.run import BenchResult
+from elevon.bench.procedure import Procedure, load_procedure
+from elevon.bench.run import BenchResult, run_procedure
 from elevon.compare import Comparison
+from elevon.compare import compare as run
 from elevon.faults import Fault
 from elevon.logs.formats.drive import DriveFormat
 from elevon.progress import Progress
-from elevon.response import FrequencyResponse, LoopResponse
+from elevon.response import (
+    FrequencyResponse,
+    LoopResponse,
+    band_of,
+    frequency_response,
+    linearise,
+    loop_response,
+)
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 
 
@@ -47,10 +55,6 @@ def bench(
     BenchResult
         Its ``paths`` are the logs' files.
     """
-    from elevon.bench.procedure import Procedure, load_procedure
-    from elevon.bench.run import run_procedure
-    from elevon.faults import Fault
-
     document = (
         procedure if isinstance(procedure, Procedure) else load_procedure(os.fspath(procedure))
     )
@@ -88,7 +92,6 @@ def compare(
     seed, start, cutoff, progress
         As `elevon.compare.compare`.
     """
-    from elevon.compare import compare as run
     from elevon.compare_loads import compare_loads
 
     model = as_actuator(actuator)
@@ -139,8 +142,6 @@ def response(
     bias, load, realisations, fidelity, seed, progress
         As `elevon.response.frequency_response`.
     """
-    from elevon.response import band_of, frequency_response, linearise, loop_response
-
     model = as_actuator(actuator)
     if loop is not None:
         measured = loop_response(

@@ -76,8 +76,6 @@ def acquire(
     seed : int
         Of the channels' noise.
     """
-    from elevon.recording import Recording
-
     clock = np.asarray(run.clock().time, dtype=np.float64)
     time = np.arange(math.floor(clock[-1] * rate + 1e-9) + 1, dtype=np.float64) / rate
     rng = np.random.default_rng([seed, 2])

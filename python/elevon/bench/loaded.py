@@ -125,8 +125,6 @@ def _scenario(
     conditions: Conditions,
     faults: Sequence[Fault | str],
 ) -> Scenario:
-    from elevon.scenario import Scenario
-
     data: dict[str, Any] = {
         "duration": parse_quantity(step.duration, "s", "duration"),
         "command": _command(step, conditions.start),

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar
 
 from elevon.actuator import Actuator
 from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_loaded
-from elevon.bench.procedure import Procedure
+from elevon.bench.procedure import Procedure, procedure_names
 from elevon.bench.rig import Setup, setups
 from elevon.bench.stand import stand_of
 from elevon.bench.state import BenchState
@@ -106,8 +106,6 @@ def stand_setups(
     InputError
         No stand, a procedure of another stand, and what the stand refuses.
     """
-    from elevon.bench.procedure import procedure_names
-
     stand = stand_of(actuator.wiring)
     if procedure.stand not in (None, stand.name):
         raise InputError(

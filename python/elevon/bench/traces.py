@@ -18,7 +18,7 @@ from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import write_loadcell
 from elevon.parameters.records import wirings
 from elevon.recording import Recording
-from elevon.units import parse_quantity
+from elevon.units import format_quantity, parse_quantity
 
 _LOGGED = {
     "encoder_position": "encoder_position",
@@ -165,7 +165,6 @@ def _stated(term: dict[str, Any], default_unit: str) -> dict[str, Any]:
 
 
 def _waveform(term: Any) -> dict[str, Any]:
-    from elevon.units import format_quantity
     from elevon.waveforms import unit_of, wave_records
 
     shape: dict[str, Any] = {"waveform": term.kind}

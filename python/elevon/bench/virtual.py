@@ -12,6 +12,7 @@ from elevon.bench.traces import cell_signals, drive_signals
 from elevon.logs.command.note import CommandNote
 from elevon.logs.log import Log
 from elevon.recording import Recording
+from elevon.recording import Recording as Built
 
 
 def first_trace(procedure: Procedure) -> Procedure:
@@ -46,7 +47,6 @@ def traced(
         Deviation of white noise on channels of the log, SI.
     """
     from elevon.logs.brake import brake_of
-    from elevon.logs.log import Log
 
     signals = drive_signals(setup, recording)
     rng = np.random.default_rng([setup.conditions.seed, 7])
@@ -69,7 +69,6 @@ def traced(
 
 def _noted(setup: Setup) -> CommandNote:
     """What the operator notes of the command: a single waveform."""
-    from elevon.logs.command.note import CommandNote
     from elevon.units import parse_quantity
     from elevon.waveforms import unit_of, wave_records
 
@@ -84,8 +83,6 @@ def _noted(setup: Setup) -> CommandNote:
 
 def _cell(setup: Setup, recording: Recording, factor: float) -> Recording:
     """Return a recording of the brake's torque by the load cell, on the drive's clock."""
-    from elevon.recording import Recording as Built
-
     signals = cell_signals(setup, recording)
     if signals is None:
         return recording

@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 
 from elevon.actuator import Actuator
-from elevon.calibrate.outcome import Calibration
-from elevon.calibrate.slips import WeightDrop
+from elevon.calibrate.outcome import Calibration, LogFacts, by_path
+from elevon.calibrate.slips import WeightDrop, find_slips
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
 
@@ -41,8 +41,6 @@ def run_drops(path: Path, actuator: Actuator) -> Calibration:
     import numpy as np
 
     from elevon.calibrate.compliance import calibrate_compliance
-    from elevon.calibrate.outcome import Calibration, LogFacts, by_path
-    from elevon.calibrate.slips import find_slips
 
     drops = _read(path)
     mended, slips = find_slips(drops)
@@ -75,8 +73,6 @@ def run_drops(path: Path, actuator: Actuator) -> Calibration:
 
 
 def _read(path: Path) -> list[WeightDrop]:
-    from elevon.calibrate.slips import WeightDrop
-
     text = read_regular(path, _MOST_BYTES).decode("utf-8-sig")
     lines = [x for x in text.splitlines() if x and not x.startswith("#")]
     drops = []

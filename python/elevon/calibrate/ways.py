@@ -10,7 +10,7 @@ from typing import Protocol
 from elevon.actuator import Actuator
 from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.stages.choice import balanced, preloaded
-from elevon.calibrate.validation import Validation
+from elevon.calibrate.validation import Validation, validate
 from elevon.errors import ElevonError, InputError
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
@@ -123,8 +123,6 @@ class _Signals:
 
     def _compared(self, result: Calibration, transient: float | None) -> Calibration:
         """Old and new values in closed loop on the same logs, where positions were logged."""
-        from elevon.calibrate.validation import validate
-
         if any(not log.has("output_position", "motor_position") for log in self.logs):
             return _with(result, _NOT_COMPARED)
         try:
@@ -156,8 +154,6 @@ class _Signals:
         transient: float | None,
         progress: Progress | None,
     ) -> Validation:
-        from elevon.calibrate.validation import validate
-
         return validate(
             self.logs, actuator, fidelity=fidelity, transient=transient, progress=progress
         )

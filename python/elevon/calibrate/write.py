@@ -10,11 +10,11 @@ from elevon.calibrate.thresholds import thresholds
 from elevon.estimate import LEVEL
 from elevon.files import write_text
 from elevon.parameters import Parameter
+from elevon.parameters.find import base_reference
 from elevon.parameters.records import record_of
 from elevon.parameters.write import updated_set
 
 if TYPE_CHECKING:
-    from elevon.actuator import Actuator
     from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import Validation
 
@@ -115,25 +115,15 @@ def write_calibration(
     """
     target = Path(path).expanduser()
     name = _name(target.stem)
-    text = set_text(result, name=name, base=_base(result.before, target), validation=validation)
+    text = set_text(
+        result,
+        name=name,
+        base=base_reference(result.before.path, result.before.name, target),
+        validation=validation,
+    )
     return write_text(target, text, force=force)
 
 
 def _name(stem: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
     return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
-
-
-def _base(before: Actuator, target: Path) -> str:
-    """Name of an actuator file of the package, else the path from the new file to the old one."""
-    from elevon.parameters.find import find_set
-
-    path, name = before.path, before.name
-    if path is None:
-        return name
-    try:
-        if find_set(name).resolve() == path.resolve():
-            return name
-    except ValueError:
-        pass
-    return os.path.relpath(path.resolve(), target.resolve().parent).replace(os.sep, "/")

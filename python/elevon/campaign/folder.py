@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from elevon.campaign.block import block_name, write_rows
+from elevon.campaign.block import block_name, signal_schema, write_rows
 from elevon.campaign.card import card_texts
 from elevon.campaign.dataset import Dataset
 from elevon.campaign.described import described_item, read_description
@@ -371,8 +371,6 @@ def new_manifest(resolved: Resolved, need: Cost) -> Manifest:
 
 
 def _clock(resolved: Resolved, clock: ClockPlan) -> dict[str, Any]:
-    from elevon.campaign.block import signal_schema
-
     unit = resolved.prepared(0).command_unit
     columns = [
         {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from elevon.bench.procedure import Procedure
+from elevon.bench.procedure import Procedure, load_procedure
 
 HELD_OUT = "held-out"
 """Name of the log that is kept from the calibration."""
@@ -15,6 +15,4 @@ LOADED = "loaded"
 
 def demo_procedure() -> Procedure:
     """Return the procedure: three logs to calibrate on, one kept back."""
-    from elevon.bench.procedure import load_procedure
-
     return load_procedure(Path(str(files("elevon.demo") / "bench.toml")))

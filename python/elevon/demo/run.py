@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from elevon.actuator import Actuator
-from elevon.calibrate import Validation
+from elevon.calibrate import Validation, calibrate, validate
 from elevon.calibrate.outcome import Calibration
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
 from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
 from elevon.demo.results import Backlashes
 from elevon.demo.steps import Story, Work
-from elevon.logs.importing import ImportedLog
+from elevon.logs.importing import ImportedLog, import_log, same_rate
 from elevon.logs.log import Log
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
@@ -144,8 +144,6 @@ def run_demo(
     Interrupted
         `progress` returned False.
     """
-    from elevon.actuator import Actuator
-
     base = Actuator.load("torino-rotary")
     hidden = hidden_actuator(base, seed)
     folder = Path(out).expanduser()
@@ -220,7 +218,6 @@ def _bench(demo: Demo, progress: Progress | None) -> list[Path]:
 
 def _read(demo: Demo) -> None:
     from elevon.logs.drive import drive_log
-    from elevon.logs.importing import import_log, same_rate
     from elevon.logs.read import log_of
 
     def work() -> None:
@@ -233,7 +230,6 @@ def _read(demo: Demo) -> None:
 
 
 def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> None:
-    from elevon.calibrate import calibrate
     from elevon.calibrate.write import write_calibration
 
     used = [log for log in demo.logs if log.name != f"{HELD_OUT}.csv"]
@@ -282,8 +278,6 @@ def _truth(demo: Demo) -> dict[str, float]:
 
 
 def _validate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> None:
-    from elevon.calibrate import Validation, validate
-
     def validated(piece: str, actuator: Actuator, share: Progress | None) -> Validation:
         what = "published" if piece == "before" else "calibrated"
         return demo.resumed(

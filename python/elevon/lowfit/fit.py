@@ -16,7 +16,7 @@ from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
 from elevon.lowfit.cases import FitCase
 from elevon.parameters.records import records
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.recording import Recording
 
 Array = npt.NDArray[np.float64]
@@ -131,8 +131,6 @@ def _fitted(
     seed: int,
     progress: Progress | None,
 ) -> LowFit:
-    from elevon.progress import part
-
     high = _signals(actuator, cases, "high", seed, part(progress, 0.0, 0.9))
     problem = _Problem(actuator, tuple(cases), tuple(high), seed)
     seen, unchanged = problem.split(free)

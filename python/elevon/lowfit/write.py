@@ -7,7 +7,7 @@ from pathlib import Path
 
 from elevon.lowfit.fit import LowFit
 from elevon.parameters import Parameter
-from elevon.parameters.find import find_set
+from elevon.parameters.find import base_reference
 from elevon.parameters.write import write_set
 
 
@@ -32,7 +32,7 @@ def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False)
         target,
         name=_name(target.stem),
         changes=fitted_parameters(fit),
-        base=_base(fit, target),
+        base=base_reference(fit.before.path, fit.before.name, target),
         title=f"{fit.before.title or fit.before.name}, reduced-order model fitted",
         force=force,
     )
@@ -41,16 +41,3 @@ def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False)
 def _name(stem: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
     return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
-
-
-def _base(fit: LowFit, target: Path) -> str:
-    """Name of an actuator file of the package, else the path from the new file to the old one."""
-    path, name = fit.before.path, fit.before.name
-    if path is None:
-        return name
-    try:
-        if find_set(name).resolve() == path.resolve():
-            return name
-    except ValueError:
-        pass
-    return os.path.relpath(path.resolve(), target.resolve().parent).replace(os.sep, "/")

@@ -87,3 +87,15 @@ def _user_folders() -> list[Path]:
         if not folder.is_dir():
             raise InputError(f"{VARIABLE}: {folder} is not a folder")
     return folders
+
+
+def base_reference(path: Path | None, name: str, target: Path) -> str:
+    """Return how a new file names its base: a shipped set's name, else the path to it."""
+    if path is None:
+        return name
+    try:
+        if find_set(name).resolve() == path.resolve():
+            return name
+    except ValueError:
+        pass
+    return os.path.relpath(path.resolve(), target.resolve().parent).replace(os.sep, "/")

@@ -10,7 +10,7 @@ from typing import Any
 from elevon.errors import InputError
 from elevon.files import write_text
 from elevon.parameters.parameter import CONFIDENCES, Parameter
-from elevon.units import to_display
+from elevon.units import parse_quantity, to_display
 
 
 def updated_set(text: str, changes: Iterable[Parameter]) -> str:
@@ -115,7 +115,6 @@ def _written(value: float | str, unit: str) -> float | str:
     """Return the shortest number in the entry's own unit that reads back as the same SI float."""
     if isinstance(value, str):
         return value
-    from elevon.units import parse_quantity
 
     exact = float(to_display(value, unit))
     for digits in range(6, 17):

@@ -12,7 +12,7 @@ from elevon.errors import FormatError, InputError, unknown
 from elevon.recording.channel import Channel, in_si
 from elevon.recording.channel_set import ChannelSet
 from elevon.recording.clock import Clock
-from elevon.recording.header import plain
+from elevon.recording.header import Header, plain
 from elevon.recording.roles import channel_of, roles_of
 from elevon.recording.window import cut
 
@@ -211,8 +211,6 @@ class Recording(ChannelSet):
 
     def equals(self, other: "Recording") -> bool:
         """Return whether two recordings are the same, to the last bit of every value."""
-        from elevon.recording.header import Header
-
         return (
             Header.of(self).to_json() == Header.of(other).to_json()
             and all(self.clocks[name].equals(other.clocks[name]) for name in self.clocks)

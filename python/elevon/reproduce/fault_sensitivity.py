@@ -22,7 +22,7 @@ from elevon.data import read_table
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault, find_record
 from elevon.plain import WORKING, Plain
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.scenario import Scenario
 
@@ -126,7 +126,6 @@ def fault_sensitivity(
     """
     if scenario.seconds <= start:
         raise InputError(f"faults: the scenario lasts {scenario.seconds:g} s, not over {start:g} s")
-    from elevon.progress import part
     from elevon.simulate.acting import together
 
     parsed = [Fault.parse(text) for text in _default(actuator, faults)]

@@ -9,7 +9,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, default_scenario, filtered
 from elevon.plain import Plain
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.report import Check
 from elevon.report.checks import CheckedResult
 from elevon.scenario import Scenario
@@ -95,8 +95,6 @@ def reproduce_low_fidelity(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.progress import part
-
     rows = []
     for number, (name, (drive, braked, floored)) in enumerate(CASES.items()):
         start, stop = number / 4.0, (number + 1) / 4.0

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.errors import SimulationError
-from elevon.faults.catalogue import FaultRecord
+from elevon.faults.catalogue import FaultRecord, catalogue
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
@@ -147,7 +147,6 @@ def reproduce_failures(
     SimulationError
         A run diverged or was interrupted.
     """
-    from elevon.actuator import Actuator
     from elevon.simulate import Run, simulate_batch
 
     actuator = Actuator.load(ACTUATOR)
@@ -170,8 +169,6 @@ def reproduce_failures(
 
 
 def _cases(actuator: Actuator, fidelity: str, faults: Sequence[str] | None) -> Iterator[_Case]:
-    from elevon.faults.catalogue import catalogue
-
     for record in catalogue(actuator.wiring):
         if fidelity not in record.fidelities or (faults is not None and record.kind not in faults):
             continue

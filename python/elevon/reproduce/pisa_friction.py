@@ -105,8 +105,6 @@ def reproduce_friction(*, seed: int = 0, progress: Progress | None = None) -> Fr
     SimulationError
         A run tripped or diverged.
     """
-    from elevon.actuator import Actuator
-
     actuator = Actuator.load(ACTUATOR)
     lead = 2.0 * math.pi * actuator.parameters.value("screw.lead")
     tests = [

@@ -13,7 +13,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.calibrate.validation import Validation, ValidationTrace
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import ACTUATOR, CONDITIONS, Condition
@@ -94,9 +94,7 @@ def reproduce_validation(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.actuator import Actuator
     from elevon.calibrate.replay import validate_replay
-    from elevon.progress import part
 
     model = Actuator.load(ACTUATOR)
     unit = _unit(model)

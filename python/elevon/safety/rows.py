@@ -136,8 +136,6 @@ class Row:
 
     def scenario(self) -> Scenario:
         """Return the row as a scenario."""
-        from elevon.scenario import Scenario
-
         supply, factor, temperature = ENVIRONMENTS[self.environment]
         data: dict[str, Any] = {
             "duration": self.duration,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
@@ -34,10 +35,15 @@ _LAG_FOR_DELAY = {
     "control.pid_integral_time": 0.004,
 }
 _WEIGHTS = (0.25, 4.0)  # of a channel or log against the others: what a misfit would change
-#: Reasons of numbers that the logs do not feel: they stay as given.
-SILENT = ("changes nothing that the logs show", "the logs do not reach this limit")
 _RATIO = "friction.reverse_scale"
 _LIMITS = ("control.current_limit", "control.speed_limit", "inverter.supply_voltage")
+
+
+class Silence(StrEnum):
+    """Why the logs do not feel a number: it stays as given."""
+
+    NO_EFFECT = "changes nothing that the logs show"
+    LIMIT = "the logs do not reach this limit"
 
 
 @dataclass(frozen=True)
@@ -233,10 +239,8 @@ def _reasons(lanes: Lanes, x: Floats, covariance: Floats, strength: Floats) -> l
         bound = min(x[k] - lanes.low[k], lanes.high[k] - x[k]) < 1e-6
         if not wide and not bound:
             reasons.append("")
-        elif strength[k] < _SILENT and f.path in _LIMITS:
-            reasons.append(SILENT[1])
         elif strength[k] < _SILENT:
-            reasons.append(SILENT[0])
+            reasons.append(Silence.LIMIT if f.path in _LIMITS else Silence.NO_EFFECT)
         elif bound and f.path != "friction.stick":
             reasons.append(f"ends at its bound, {f.outer(float(x[k])):.4g} {f.unit}")
         else:

@@ -19,7 +19,6 @@ from elevon.calibrate.closed_loop.log import motion
 from elevon.calibrate.closed_loop.model import LoopModel
 from elevon.calibrate.closed_loop.start import windows
 from elevon.estimate.free import inner, outer
-from elevon.estimate.lanes import Point
 from elevon.logs.log import Log
 
 #: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
@@ -57,15 +56,11 @@ def refined(
             scales = lanes.scales
         lanes.scales = scales.copy()
         tried.append((late, lanes.solve(x[None, :], rounds=_ROUNDS)[0]))
-    best, point = min(tried, key=_cost)
+    best, point = min(tried, key=lambda item: item[1].cost)
     # The belief stays with the first values of the search.
     first = {item.path: item.start for item in chosen.free}
     free = tuple(replace(item, start=first.get(item.path, item.start)) for item in free)
     return best, replace(chosen, free=free, x=point.x)
-
-
-def _cost(tried: tuple[Actuator, Point]) -> float:
-    return tried[1].cost
 
 
 def steps(actuator: Actuator, logs: Sequence[Log]) -> list[float]:

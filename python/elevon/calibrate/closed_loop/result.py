@@ -18,13 +18,13 @@ from elevon.calibrate.closed_loop.fit import (
     search,
 )
 from elevon.calibrate.closed_loop.free import CURRENT_GAIN, STICK, STRUCTURES, in_set
-from elevon.calibrate.closed_loop.intervals import SILENT, Knowledge, known
+from elevon.calibrate.closed_loop.intervals import Knowledge, Silence, known
 from elevon.calibrate.closed_loop.predict import held_out_errors, traces_of, units_of
 from elevon.calibrate.closed_loop.refine import refined
 from elevon.calibrate.named import named
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
 from elevon.calibrate.validation import SignalError
-from elevon.errors import InputError, Interrupted
+from elevon.errors import InputError, Interrupted, unknown
 from elevon.estimate import Estimate, quantile
 from elevon.logs.log import Log
 from elevon.parameters.relations import static_following
@@ -111,6 +111,10 @@ def calibrate_loop(
         promise=validated,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+#: A cascade's speed limit has no meaning as it was given for a PID.
+_CASCADE = ("cascade", "control.speed_limit")
 
 
 def _settled(
@@ -208,7 +212,6 @@ class _Reporter:
 
 
 def _check(logs: Sequence[Log], actuator: Actuator, structure: str | None) -> None:
-    from elevon.errors import unknown
     from elevon.parameters.records import records
 
     if not logs:
@@ -261,10 +264,10 @@ def _with(
     """Fitted values; what the logs do not feel stays as given."""
     values: dict[str, str | float] = {"control.structure": structure}
     for path, value in fitted.values.items():
-        silent = missing.get(path, "") in SILENT
+        silent = isinstance(missing.get(path), Silence)
         if path == STICK:
             values["friction.static"] = value * fitted.values["friction.dynamic"]
-        elif in_set(path) and not (silent and path not in _loops(structure)):
+        elif in_set(path) and (not silent or (structure, path) == _CASCADE):
             values[path] = value
     if CURRENT_GAIN in values:
         # The zero of the current loop's PI stays where it is.
@@ -275,11 +278,6 @@ def _with(
             actuator.parameters, float(values["friction.dynamic"])
         )
     return actuator.with_values(values, source="calibration")
-
-
-def _loops(structure: str) -> tuple[str, ...]:
-    """What has no meaning as it was given."""
-    return ("control.speed_limit",) if structure == "cascade" else ()
 
 
 def agreement(fitted: Fitted) -> list[SignalError]:

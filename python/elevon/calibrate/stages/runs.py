@@ -19,7 +19,7 @@ from elevon.calibrate.stages.moves import moves_of
 from elevon.errors import ElevonError
 from elevon.estimate import Estimate
 from elevon.logs.log import Log
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 
 _RATE = 25e3  # Hz at least of a run's channels, before the recorder's filter
 _SHARE = 0.1  # of a correction, as its deviation: ASSUMED, the model is not the machine
@@ -52,8 +52,6 @@ def run_again(
     list of Log
         Empty where a run does not carry out its motions as the log did.
     """
-    from elevon.progress import part
-
     moving = [log for log in logs if moves_of(log) and log.recording and log.has("command")]
     again = []
     for number, log in enumerate(moving):

@@ -27,10 +27,10 @@ from elevon.demo.life.unit import (
     of_day,
 )
 from elevon.demo.steps import Work
-from elevon.errors import Interrupted
+from elevon.errors import Interrupted, OutputExistsError
 from elevon.logs.log import Log
 from elevon.plain import plain, read_plain
-from elevon.prognose import Prognosis
+from elevon.prognose import ParticleFilter, Process, Prognosis, respond
 from elevon.prognose.life import Life
 from elevon.progress import Progress, part
 
@@ -109,7 +109,6 @@ def run_life(
 
 def _claim(demo: LifeDemo, *, force: bool) -> None:
     """Refuse what may not be replaced; clear what earlier work left; or go on with this work."""
-    from elevon.errors import OutputExistsError
     from elevon.files import check_output
 
     if demo.finished.begun(force=force):
@@ -184,8 +183,6 @@ def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
 
 
 def _tables(demo: LifeDemo, progress: Progress | None) -> None:
-    from elevon.prognose import respond
-
     demo.response = demo.timed(
         "model runs: what severities do to the mission and its requirements",
         lambda: respond(
@@ -197,7 +194,6 @@ def _tables(demo: LifeDemo, progress: Progress | None) -> None:
 def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
     """Inspect, diagnose and predict, at irregular uses, until the unit has failed."""
     from elevon.logs.read import read_drive_logs
-    from elevon.prognose import ParticleFilter, Process
 
     rng = np.random.default_rng([demo.seed, 11])
     baselines = read_drive_logs(demo.healthy, one_rate=False)

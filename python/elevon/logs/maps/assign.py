@@ -19,7 +19,7 @@ from elevon.logs.maps.shafts import (
 )
 from elevon.logs.maps.signals import known_roles, known_signals, safe_name, unit_among
 from elevon.logs.report import ImportReport
-from elevon.units import parse_unit
+from elevon.units import parse_unit, si_unit
 
 
 @dataclass(slots=True)
@@ -189,8 +189,6 @@ def _mapped(entry: ColumnEntry, table: RawTable, gear_ratio: float | None) -> As
 
 
 def _si(unit: str) -> str:
-    from elevon.units import si_unit
-
     return si_unit(unit)
 
 

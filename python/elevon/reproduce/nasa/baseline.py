@@ -36,7 +36,7 @@ from elevon.reproduce.nasa.histories import time_histories
 from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, MotionProfile, profile_scenario
 from elevon.reproduce.nasa.store import CellStore, work_key
-from elevon.simulate import Run
+from elevon.simulate import Run, simulate_batch
 
 Array = npt.NDArray[np.float64]
 Case = tuple[MotionProfile, float]
@@ -122,8 +122,6 @@ def reproduce_baseline(
     SimulationError
         A run diverged.
     """
-    from elevon.actuator import Actuator
-
     actuator = actuator or Actuator.load(ACTUATOR)
     able = Capability.of(actuator)
     cells = list(baseline_matrix() if cases is None else cases)
@@ -177,7 +175,6 @@ def _runs(
 ) -> dict[tuple[int, int], Run]:
     """Every run by block and cell."""
     from elevon.scenario import Scenario
-    from elevon.simulate import Run
 
     runs = {}
     nominal = actuator.with_values(SOLVER)
@@ -218,8 +215,6 @@ def _measure(
     progress: Progress | None,
 ) -> dict[tuple[int, int], tuple[float, ...]]:
     """Return `MEASURES` of every run; runs that share a batch go together."""
-    from elevon.simulate import simulate_batch
-
     alike: dict[tuple[bool, float], list[tuple[int, int]]] = {}
     for place in runs:
         profile = cells[place[1]][0]

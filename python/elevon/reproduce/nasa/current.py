@@ -15,7 +15,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.plain import Plain
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.report.checks import Check, verdict
 from elevon.units import to_si
 
@@ -136,9 +136,6 @@ def reproduce_current(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.actuator import Actuator
-    from elevon.progress import part
-
     model = Actuator.load(ACTUATOR)
     wanted = _experiments()
     rows, traces = [], []

@@ -97,8 +97,6 @@ def fit_dema(seed: int = 0, progress: Progress | None = None) -> DemaFit:
     SimulationError
         A run did not reach its end.
     """
-    from elevon.actuator import Actuator
-
     rng = np.random.default_rng([seed, 3])
     dema = Actuator.load(DEMA)
     nominal = dema.with_values(LOW_STEP)

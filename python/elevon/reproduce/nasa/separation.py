@@ -34,7 +34,7 @@ from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
 from elevon.reproduce.nasa.store import CellStore, work_key
-from elevon.simulate import Run
+from elevon.simulate import Run, simulate_batch
 
 Array = npt.NDArray[np.float64]
 
@@ -112,8 +112,6 @@ def reproduce_separation(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.actuator import Actuator
-
     actuator = Actuator.load(ACTUATOR)
     meta = _provenance(actuator)
     key = work_key(seed=seed, faults=[f.text() for f in faults], healthy=healthy,
@@ -173,7 +171,6 @@ def _cell(
 ) -> dict[str, Array]:
     """Features of every unit of one profile and load, by condition; shape (units, features)."""
     from elevon.scenario import Scenario
-    from elevon.simulate import Run
 
     shape, load = case
     plain = Scenario.from_dict(profile_scenario(_profile(shape), opposing=load))
@@ -195,7 +192,6 @@ def _simulated(
 ) -> Array:
     """Features of all runs, a few at a time to bound the memory of their recordings."""
     from elevon.errors import SimulationError
-    from elevon.simulate import simulate_batch
 
     chunks = []
     for start in range(0, len(runs), CHUNK):

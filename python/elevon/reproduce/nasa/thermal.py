@@ -94,8 +94,6 @@ def reproduce_thermal(*, seed: int = 0, progress: Progress | None = None) -> The
     SimulationError
         A run did not reach its end.
     """
-    from elevon.actuator import Actuator
-
     actuator = Actuator.load(ACTUATOR)
     hour = _hour(actuator, seed, part(progress, 0.0, 0.1))
     checks = [_steady_check(actuator, seed, part(progress, 0.1, 0.25))]
