@@ -11,6 +11,8 @@ from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.recording.names import check_name
 
+_FLOAT = np.dtype(np.float64)
+
 
 @dataclass(frozen=True, eq=False)
 class Clock:
@@ -80,6 +82,10 @@ class Clock:
 
 def frozen(values: object, place: str) -> Floats:
     """Return values as a read-only float64 vector, without copying one that already is."""
+    if type(values) is np.ndarray and values.dtype is _FLOAT and values.ndim == 1:
+        vector = values.view() if values.flags.writeable else values
+        vector.flags.writeable = False
+        return vector
     try:
         array = np.asarray(values)
         if array.dtype.kind not in "fiub":

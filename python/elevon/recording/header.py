@@ -154,6 +154,7 @@ def _clock(entry: Mapping[str, Any]) -> ClockHeader:
 
 
 _PLAIN = frozenset({str, int, float, bool, type(None)})
+_TEXT = frozenset({str})
 
 
 def plain(value: Any, place: str, depth: int = 0) -> Any:
@@ -175,10 +176,10 @@ def plain(value: Any, place: str, depth: int = 0) -> Any:
         return value
     # Most items are plain already: their places are not written out.
     if isinstance(value, Mapping):
+        if _PLAIN.issuperset(map(type, value.values())) and _TEXT.issuperset(map(type, value)):
+            return dict(value)
         return {
-            k if type(k) is str else str(k): v
-            if type(v) in _PLAIN
-            else plain(v, f"{place}.{k}", depth + 1)
+            str(k): v if type(v) in _PLAIN else plain(v, f"{place}.{k}", depth + 1)
             for k, v in value.items()
         }
     if isinstance(value, (list, tuple)):

@@ -39,6 +39,7 @@ def build_recording(
         key = (plan.name, plan.rate, id(rows["time"]))
         clock = shared.get(key) or shared.setdefault(key, Clock(plan.name, rows["time"], plan.rate))
         clocks.append(clock)
+        rows["values"].flags.writeable = False
         columns = rows["values"].T
         channels.extend(
             Channel(name, unit, columns[column], clock, text)
