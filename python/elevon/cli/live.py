@@ -68,6 +68,10 @@ def live(
         Path | None,
         typer.Option(metavar="DIR", help="Write the page with a recorded session instead."),
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write that session as an animated SVG instead."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     seed: SeedOption = 0,
     settings: SetOption = None,
@@ -75,8 +79,7 @@ def live(
     """Show an actuator at real time in the browser: move it, break it, watch it being found out."""
     from elevon.live.server import serve
 
-    if static is not None:
-        check_outputs([static / "index.html"], force=force)
+    check_outputs([static / "index.html" if static else None, picture], force=force)
     bench: LiveBench | LogReplay
     if map_ is not None or _is_log(actuator):
         from elevon.live.replay import LogReplay
@@ -95,8 +98,22 @@ def live(
         paths = write_static(bench, static, force=force)
         sys.stdout.write(f"{len(paths)} files in {static}\n")
         return
+    if picture is not None:
+        _picture(bench, picture, force=force)
+        return
     with interrupt.telling(lambda: _story(bench)):
         serve(bench, port=port, host=host, browser=not no_browser, ready=_ready)
+
+
+def _picture(bench: LiveBench | LogReplay, path: Path, *, force: bool) -> None:
+    from elevon.files import write_text
+    from elevon.live.bench import LiveBench
+    from elevon.live.picture import animated_picture
+
+    if not isinstance(bench, LiveBench):
+        raise InputError("--picture: draws a session of an actuator, not of a log")
+    write_text(path, animated_picture(bench), force=force)
+    sys.stdout.write(f"{path}: a session of the live bench\n")
 
 
 def _story(bench: LiveBench | LogReplay) -> str:

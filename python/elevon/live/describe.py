@@ -96,6 +96,8 @@ def _plots(unit: LiveUnit) -> list[dict[str, Any]]:
     plots = []
     for title, names in PLOTS:
         present = [name for name in names if name in unit.names]
+        units = unit.units  # one axis has one unit: that of the last signal
+        present = [name for name in present if units[name] == units[present[-1]]]
         if present:
             plots.append({"title": title, "signals": present})
     return plots

@@ -14,7 +14,7 @@ import numpy as np
 from elevon.errors import InputError
 from elevon.files import check_output, write_bytes, write_text
 from elevon.live.app import asset
-from elevon.live.health import examine
+from elevon.live.health import Health, examine
 from elevon.live.trace import write_stretch
 from elevon.plain import plain
 from elevon.results import finite
@@ -122,7 +122,9 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
 
 def _state(bench: LiveBench) -> dict[str, Any]:
     part = bench.stretch()
-    if not isinstance(part, str):
+    if isinstance(part, str):
+        bench.watch.health = Health(text=part)
+    else:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "live.csv"
             write_stretch(path, part, bench.unit.actuator, bench.unit.fidelity)

@@ -160,8 +160,8 @@ function landingGear(model) {
   const hinge = [392, 60], strut = drawn("line", { x1: 0, y1: 92, x2: 0, y2: 0, class: "frame" });
   const leg = drawn("g", {}, drawn("line", { x1: hinge[0], y1: hinge[1], x2: hinge[0], y2: 170, class: "arm" }), drawn("line", { x1: hinge[0], y1: hinge[1], x2: hinge[0] - 36, y2: hinge[1] + 16, class: "arm" }), drawn("circle", { cx: hinge[0], cy: 186, r: 20, class: "metal" }), drawn("circle", { cx: hinge[0], cy: 186, r: 7, class: "frame" }));
   const lock = drawn("path", { d: "M-7 0 v-12 a7 7 0 0 1 14 0 v12 z", class: "frame" }), body = drawn("rect", { x: 238, y: 132, width: 24, height: 18, rx: 3, class: "off" });
-  const lockWords = text(250, 168, "", "value", "middle"), words = text(205, 30, "", "value", "middle"), load = new Arrow(300, 200, "load");
-  const lamps = [["proximity_0", "0 %"], ["proximity_25", "25 %"], ["proximity_75", "75 %"], ["proximity_100", "100 %"], ["proximity_wheels", "wheels"], ["brake_released", "brake free"]].map(([name, label], k) => ({ name, ...lamp(28 + 36 * k * 1.05, 190, label) }));
+  const lockWords = text(250, 168, "", "value", "middle"), words = text(205, 30, "", "value", "middle"), load = new Arrow(330, 150, "load");
+  const lamps = [["proximity_0", "0 %"], ["proximity_25", "25 %"], ["proximity_75", "75 %"], ["proximity_100", "100 %"], ["proximity_wheels", "wheels"], ["brake_released", "brake free"]].map(([name, label], k) => ({ name, ...lamp(22 + 46 * k, 190, label) }));
   const ground = drawn("line", { x1: 330, x2: 495, y1: 208, y2: 208, class: "axis" });
   const nodes = [motor.node, first, second, screw.node, ram, nut, strut, leg, lock, body, lockWords, words, load.node, ground, ...lamps.map(item => item.node), drawn("circle", { cx: hinge[0], cy: hinge[1], r: 5, class: "frame" })];
   let least = Infinity, most = -Infinity;
