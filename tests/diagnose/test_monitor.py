@@ -234,6 +234,8 @@ def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
         Monitor(Actuator.load("nasa-ballscrew"), [streams["base"]])
     with pytest.raises(InputError, match="above zero"):
         Monitor(unit, [streams["base"]], false_alarm_time=0.0)
+    with pytest.raises(InputError, match="longest day of 0 s"):
+        Monitor(unit, [streams["base"]], longest=0.0)
     with pytest.raises(InputError, match="windows of 12 s"):
         Monitor(unit, [streams["base"]], window=12.0)
 
@@ -289,10 +291,12 @@ def test_the_command(elevon_cli, tmp_path, monkeypatch):  # noqa: F811
     assert refused.code == 2
     assert refused.out == ""
     for words, why in (
+        (["-"], "the stream ends in mid-line, 3 bytes"),
         (["-", "--json"], "one object"),
         (["-", logs[0]], "alone"),
         ([logs[0], "--state", "s"], "give - as the log"),
     ):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"a,b")))
         refused = elevon_cli("monitor", *words, *options)
         assert refused.code == 2
         assert why in refused.err

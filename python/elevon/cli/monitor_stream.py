@@ -59,8 +59,7 @@ def watch_stream(
         finally:
             _save(watch, state)
     if state is None and not watch.windows:
-        reasons = "; ".join(watch.skipped) or "the stream is shorter than one"
-        raise InputError(f"no window of {watch.width:g} s could be used: {reasons}")
+        raise InputError(f"no window of {watch.width:g} s could be used: {_why(watch, reader)}")
     _end(watch, reader)
 
 
@@ -88,6 +87,18 @@ def _take(part: StreamPart, reader: StreamReader, watch: Monitor) -> bool:
         watch.new_day()
         return True
     return bool(steps)
+
+
+def _why(watch: Monitor, reader: StreamReader) -> str:
+    """What came instead of a window."""
+    reasons = list(watch.skipped)
+    if watch.latest is not None:
+        reasons.append(f"the day's samples span {watch.latest - (watch.origin or 0.0):g} s")
+    counts = {n.replace("_", " "): k for n, k in watch.samples.to_dict().items() if k}
+    reasons += [f"samples {name}: {count}" for name, count in counts.items()]
+    if reader.cut_off:
+        reasons.append(f"the stream ends in mid-line, {reader.cut_off} bytes behind its last one")
+    return "; ".join(reasons) or "no sample came"
 
 
 def _save(watch: Monitor, state: Path | None) -> None:

@@ -317,6 +317,9 @@ class Monitor:
                 f"mean time between false alarms {self.false_alarm_time:g} s: must be above zero"
             )
 
+        if self.longest is not None and not self.longest > 0.0:
+            raise InputError(f"longest day of {self.longest:g} s: must be above zero")
+
     def _simulated(self) -> AlarmThresholds:
         if self.longest is None:
             self.longest = max(log.duration for log in self.baselines)
