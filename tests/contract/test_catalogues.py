@@ -53,7 +53,7 @@ def test_every_signal_is_described(wiring: str, fidelity: str) -> None:
 
 @pytest.mark.parametrize("wiring", sorted({w for w, _ in WIRINGS}))
 def test_every_fault_is_described(wiring: str) -> None:
-    """Kind, places, unit, range that holds zero, effect and source."""
+    """Kind, places, unit, range that holds zero, effect, source, and a rate with its own."""
     records = _core.faults(wiring)
     assert records
     unique([f"{r['kind']}@{place}" for r in records for place in r["places"]])
@@ -61,6 +61,8 @@ def test_every_fault_is_described(wiring: str) -> None:
         assert record["places"], record["kind"]
         assert record["effect"], record["kind"]
         assert record["source"], record["kind"]
+        assert 0.0 < record["rate"] < 1e-4, record["kind"]
+        assert record["rate_source"].startswith(("T3 Table 1.1", "ASSUMED")), record["kind"]
         assert record["minimum"] <= 0.0 <= record["maximum"], record["kind"]
         assert record["minimum"] < record["maximum"], record["kind"]
         unique([a["name"] for a in record["attributes"]])

@@ -184,6 +184,28 @@ def test_no_sensor_unlocks_a_locked_gear(fault: Any) -> None:
     assert rec["locked"].values.min() == 1.0
 
 
+@BOTH
+@pytest.mark.parametrize(
+    ("steps", "period", "duty"),
+    [
+        (((0.1, "extend"),), 0.1, 0.5),
+        (((0.1, "extend"), (1.0, "extend"), (4.0, "stop"), (5.0, "extend")), 3.0, 0.1),
+    ],
+)
+def test_a_flickering_switch_in_mid_stroke_unlocks_nothing(
+    steps: tuple[tuple[float, str], ...], period: float, duty: float, fidelity: str
+) -> None:
+    """From 200 mm its false edges alone would place the nut, short of the lock it stands in."""
+    flicker = {**during("proximity_off", "sensor.proximity_75"), "profile": {
+        "kind": "intermittent", "start": 0.05, "period": period, "duty": duty}}  # fmt: skip
+    rec = gear(*steps, duration=8.0, start="200 mm", faults=[flicker], fidelity=fidelity,
+               values={"load.factor": 3.5, "inverter.supply_voltage": 32.2})  # fmt: skip
+    assert np.diff(rec["locked"].values).min() >= 0.0
+    assert rec.final["locked"] == 1.0
+    assert not false_end(rec)
+    assert rec.final["state"] == LOCKED
+
+
 # ------------------------------------------------------------------ 3. pulses and weight on wheels
 
 

@@ -13,10 +13,9 @@ import pytest
 import elevon
 from elevon.cli import main
 from elevon.faults.catalogue import catalogue
-from elevon.safety import HAZARDS, Row, observe, population, safety
+from elevon.safety import HAZARDS, Row, campaign, observe, population, safety
 from elevon.safety.campaign import judged
 from elevon.safety.hazards import RECORD
-from elevon.safety.rates import RATES
 from elevon.safety.reasons import reason
 from elevon.safety.rows import ENVIRONMENTS, Failure, triples
 
@@ -99,7 +98,6 @@ def test_the_population_has_every_failure_and_pair() -> None:
         for second in range(first + 1, 3):
             levels = {(item[first], item[second]) for item in ENVIRONMENTS}
             assert len(levels) == 9
-    assert set(RATES) == {record.kind for record in records}
 
 
 def _carried(records: Any) -> list[Any]:
@@ -111,12 +109,18 @@ def _carried(records: Any) -> list[Any]:
     ]
 
 
-def test_a_single_failure_is_never_listed() -> None:
-    """Only combinations have reasons, and only the hazards that they explain."""
+def test_a_single_failure_is_never_listed_for_a_severe_hazard() -> None:
+    """There only combinations have reasons, and only the hazards that they explain."""
     switch = Failure("proximity_on", "sensor.proximity_100", 1.0)
     jam = Failure("jam", "screw", 1e4)
+    wheels = Failure("proximity_off", "sensor.weight_on_wheels", 1.0)
     for hazard in HAZARDS:
         assert reason(hazard.name, replace(FALL, faults=(switch,))) == ""
+        alone = reason(hazard.name, replace(UP, faults=(wheels,), wheels=((0.0, 9.0),)))
+        assert bool(alone) == (hazard.name == "retraction on wheels")
+    chatter = wheels.when("intermittent", start=0.0, period=0.1, duty=0.5)
+    on_ground = replace(UP, faults=(chatter,), wheels=((0.0, 9.0),))
+    assert reason("retraction on wheels", on_ground) == ""
     assert reason("false locked", replace(FALL, faults=(switch, jam)))
     assert reason("false locked", replace(DOWN, faults=(switch, jam))) == ""
 
@@ -131,6 +135,24 @@ def test_a_short_campaign(capsys: pytest.CaptureFixture[str], tmp_path: Any) -> 
     assert values["runs"] == sum(values["groups"].values()) > 20
     assert (tmp_path / "report.html").exists()
     assert json.loads((tmp_path / "result.json").read_text()) == values
+
+
+def test_a_planted_error_of_the_unit_fails_the_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A current that any motion takes, taken for the stop's: a switch stuck on is a lock."""
+    switch = Failure("proximity_on", "sensor.proximity_100", 1.0)
+    row = Row("planted", (switch,), 0.230, ((2.0, "free_fall"),))
+    monkeypatch.setattr(campaign, "population", lambda *_: iter([row]))
+    monkeypatch.setattr(campaign, "triples", lambda *_: iter([]))
+    actuator = elevon.Actuator.load(NAME)
+    assert safety(actuator).to_dict()["status"] == "pass"
+    planted = actuator.with_values({"control.drag_extension": 0.1, "control.confirm_time": 1e-3})
+    result = safety(planted)
+    failed = {check.name for check in result.checks if not check.passed}
+    severe = ("false locked", "free fall refused")
+    assert failed == {f"{name}: {what}" for name in severe
+                      for what in ("rows not listed", "single failures")}  # fmt: skip
+    assert result.to_dict()["status"] == "fail"
+    assert {f.fidelity for item in result.hazards for f in item.findings} == {"high"}
 
 
 def test_other_actuators_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

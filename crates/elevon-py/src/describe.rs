@@ -179,6 +179,8 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
             d.set_item("minimum_open", open)?;
             d.set_item("effect", f.effect)?;
             d.set_item("source", f.source)?;
+            d.set_item("rate", f.rate.per_hour)?;
+            d.set_item("rate_source", f.rate.source)?;
             d.set_item("attributes", dicts(py, f.attributes, |d, a| attribute(d, a, model.groups()))?)?;
             let targets = PyDict::new(py);
             for place in f.places {

@@ -126,7 +126,9 @@ def faults(
     fidelity: common.OnlyFidelityOption = None,
     not_modelled: common.NotModelledOption = False,
 ) -> Answer:
-    """List the fault catalogue: kind, places, unit, range, where each acts, effect, source.
+    """List the fault catalogue: kind, places, unit, range, where each acts, effect, source, rate.
+
+    The rate is in failures an hour at one place.
 
     With an actuator: only what acts in it, in its own ranges, with the drives under which it acts
     at each fidelity.
@@ -134,7 +136,8 @@ def faults(
     rows = [row for row in _faults(actuator, fidelity) if chosen(row[1], fidelity, not_modelled)]
     listed = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
     first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
-    columns = ("kind", "places", "unit", "range", where, "effect", "source", "not_modelled")
+    columns = ("kind", "places", "unit", "range", where, "effect", "source", "rate", "rate_source",
+               "not_modelled")  # fmt: skip
     return _answer("faults", listed, (*first, *columns))
 
 
@@ -167,6 +170,8 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
         "not_modelled": dict(record.not_modelled),
         "effect": record.effect,
         "source": record.source,
+        "rate": record.rate,
+        "rate_source": record.rate_source,
     }
 
 
@@ -268,7 +273,8 @@ def _needed(parameter: dict[str, Any]) -> str:
 def _answer(what: str, rows: list[dict[str, Any]], columns: tuple[str, ...]) -> Answer:
     cells = [[_cell(row[column]) for column in columns] for row in rows]
     return Answer(
-        {what: rows}, lambda: print_table(columns, cells, optional=("acts", "not_modelled"))
+        {what: rows},
+        lambda: print_table(columns, cells, optional=("rate_source", "acts", "not_modelled")),
     )
 
 

@@ -18,7 +18,7 @@ class FaultRecord:
     """What the core's catalogue says about one kind of fault.
 
     `not_modelled` says for each fidelity without it why; `targets` which parameters it moves at
-    each place.
+    each place. `rate` is in failures an hour at one place.
     """
 
     kind: str
@@ -29,6 +29,8 @@ class FaultRecord:
     minimum_open: bool
     effect: str
     source: str
+    rate: float
+    rate_source: str
     attributes: tuple[Mapping[str, Any], ...]
     fidelities: tuple[str, ...]
     not_modelled: Mapping[str, str] = field(default_factory=dict)
@@ -96,6 +98,8 @@ def catalogue(wiring: str) -> tuple[FaultRecord, ...]:
             minimum_open=bool(item["minimum_open"]),
             effect=item["effect"],
             source=item["source"],
+            rate=float(item["rate"]),
+            rate_source=item["rate_source"],
             attributes=tuple(item["attributes"]),
             fidelities=tuple(item["fidelities"]),
             not_modelled=item["not_modelled"],

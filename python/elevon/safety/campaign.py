@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
+from elevon.faults.catalogue import find_record
 from elevon.plain import WORKING, Plain, key
 from elevon.progress import Progress
 from elevon.report.checks import Check, CheckedResult
 from elevon.safety.hazards import HAZARDS, RECORD, observe
-from elevon.safety.rates import rate
 from elevon.safety.reasons import reason
-from elevon.safety.rows import Row, population, triples
+from elevon.safety.rows import Failure, Row, population, triples
 
 WIRING = "landing_gear"
 CHUNK = 256
@@ -88,7 +89,7 @@ class HazardResult(Plain):
     def per_hour(self) -> float:
         """Sum over the different combinations of the product of their rates, one hour each."""
         combinations = {item.row.combination: item.row.faults for item in self.findings}
-        return sum(rate([fault.kind for fault in faults]) for faults in combinations.values())
+        return sum(math.prod(map(_rate, faults)) for faults in combinations.values())
 
 
 @dataclass(frozen=True)
@@ -161,15 +162,14 @@ def safety(
     ]
     first = list(judged(actuator, rows, "low", _share(progress, 0.0, 0.8)))
     repeated = list({id(row): row for _, row, _ in first}.values())
-    again = {
-        (hazard, id(row)): time
-        for hazard, row, time in judged(actuator, repeated, "high", _share(progress, 0.8, 1.0))
-    }
+    again = list(judged(actuator, repeated, "high", _share(progress, 0.8, 1.0)))
+    # What shows at both fidelities is told as high judged it, what shows at one alone counts too.
+    seen = {(hazard, id(row)): (row, "low", time) for hazard, row, time in first}
+    seen |= {(hazard, id(row)): (row, "high", time) for hazard, row, time in again}
     findings = [
-        HazardRow(hazard, row, again.get((hazard, id(row)), time),
-                "high" if (hazard, id(row)) in again else "low", reason(hazard, row))
-        for hazard, row, time in first
-    ]  # fmt: skip
+        HazardRow(hazard, row, time, fidelity, reason(hazard, row))
+        for (hazard, _), (row, fidelity, time) in seen.items()
+    ]
     hazards = tuple(
         HazardResult(item.name, item.severe,
                      tuple(one for one in findings if one.hazard == item.name))
@@ -226,6 +226,11 @@ def judged(
                     recording.status,
                 )
             yield from ((name, row, time) for name, time in observe(recording, row).items())
+
+
+def _rate(failure: Failure) -> float:
+    """Return how often an hour it comes, by the catalogue."""
+    return find_record(failure.kind, failure.place, WIRING).rate
 
 
 def _share(

@@ -1,12 +1,14 @@
-"""Why no sensor could tell: the combinations of failures that remain, by hazard."""
+"""Why no sensor could tell: the failures and combinations of them that remain, by hazard."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from elevon.safety.hazards import HAZARDS
 from elevon.safety.rows import Row
 
 _LOCK_SWITCH = "proximity_on@sensor.proximity_100"
+_WHEELS_SWITCH = "proximity_off@sensor.weight_on_wheels"
 _ORDER = {"proximity_on@sensor.proximity_75", "proximity_on@sensor.proximity_25"}
 _HANGS = {
     "jam", "friction_growth", "efficiency_loss", "lock_spring_weak", "lock_not_engaging",
@@ -29,12 +31,21 @@ def _fall_out_of_order(row: Row) -> bool:
     )
 
 
+def _ground_unseen(row: Row) -> bool:
+    """Off for good while the aircraft stands: an intermittent switch is none of it."""
+    lasting = {fault.name for fault in row.faults if dict(fault.profile)["kind"] != "intermittent"}
+    return bool(row.wheels) and _WHEELS_SWITCH in lasting
+
+
 _REASONS: tuple[tuple[str, Callable[[Row], bool], str], ...] = (
     ("false locked", _fall_without_a_lock,
      "free fall: the stages are apart, the Hall count is silent; of the switches only that on the "
      "lock sleeve sees the lock, and it reads on while the leg does not reach it"),
     ("false locked", _fall_out_of_order,
      "free fall: the lock's switch and the one whose time would contradict it both read on"),
+    ("retraction on wheels", _ground_unseen,
+     "one switch alone sees the weight; off for good it reads as in flight, and neither the place "
+     "of the leg nor its current says anything of the ground"),
 )  # fmt: skip
 
 
@@ -46,8 +57,9 @@ def reason(hazard: str, row: Row) -> str:
     hazard : str
         Its name.
     row : Row
-        Failures and commands; a single failure is never listed.
+        Failures and commands; for a severe hazard a single failure is never listed.
     """
-    if len(row.faults) < 2:
+    severe = any(item.name == hazard and item.severe for item in HAZARDS)
+    if severe and len(row.faults) < 2:
         return ""
     return next((text for name, holds, text in _REASONS if name == hazard and holds(row)), "")

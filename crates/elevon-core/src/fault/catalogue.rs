@@ -1,5 +1,6 @@
 //! The form in which a wiring lists its faults.
 
+use super::rate::Rate;
 use crate::variable::acts::{records, Fidelity};
 use crate::variable::{Group, Range};
 
@@ -65,6 +66,7 @@ pub struct FaultKind {
     pub attributes: &'static [Attribute],
     pub effect: &'static str,
     pub source: &'static str,
+    pub rate: Rate,
 }
 
 impl FaultKind {

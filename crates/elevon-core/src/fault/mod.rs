@@ -3,6 +3,7 @@
 
 mod catalogue;
 mod profile;
+pub mod rate;
 mod schedule;
 
 pub use catalogue::{Attribute, FaultKind, Op, Place, Target};

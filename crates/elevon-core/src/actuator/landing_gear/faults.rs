@@ -1,5 +1,6 @@
 //! The fault catalogue of the landing-gear actuator.
 
+use crate::fault::rate::{BEARINGS, CONNECTOR, MECHANISM, MOTOR, POSITION_SENSOR, SWITCH};
 use crate::fault::{Attribute, FaultKind, Op, Place, Target};
 use crate::variable::Range;
 
@@ -32,6 +33,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
             effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; torque falls in four of six sectors",
             source: "T2 (fault coefficients N_j)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "open_phase",
@@ -41,6 +43,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor.phase_a": "motor.open_a" Set, "motor.phase_b": "motor.open_b" Set, "motor.phase_c": "motor.open_c" Set),
             effect: "1: the phase is interrupted, from its next current zero on; two sectors are left with torque",
             source: "T3 Table 1.1 (open circuit)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "motor_shorted",
@@ -50,6 +53,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor": "inverter.terminals_shorted" Set),
             effect: "1: the motor's terminals are shorted: it brakes whatever turns it, and the next drive shoots through and trips",
             source: "P Fig. 5.4 (shorted motor)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "eccentricity_static",
@@ -59,6 +63,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor": "motor.eccentricity_static" Add),
             effect: "motor.eccentricity_law = published: k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)), torque ripple at the electrical frequency and an EMF with a mean over a turn; periodic: k_j (1 + zeta cos(phi - 2 pi (j-1)/3)), unequal amplitudes",
             source: "T2 (eccentricity coefficient zeta, phi); periodic law ASSUMED: a phase's coils stand together",
+            rate: BEARINGS,
         },
         FaultKind {
             kind: "eccentricity_dynamic",
@@ -68,6 +73,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor": "motor.eccentricity_dynamic" Add),
             effect: "fraction of the air gap; the modulation of k_j turns with the shaft, or that of the flux (motor.eccentricity_law; both ASSUMED: the paper names the fault only)",
             source: "N 4.4 and 5.1",
+            rate: BEARINGS,
         },
         FaultKind {
             kind: "demagnetisation",
@@ -77,6 +83,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor": "motor.flux_fraction" Lose),
             effect: "fraction of the magnets' flux lost: more current for the same torque",
             source: "ASSUMED: uniform loss of flux, the usual first model",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "bearing_wear",
@@ -86,6 +93,7 @@ fn motor() -> Vec<FaultKind> {
             places: places!("motor.bearing": "motor.bearing_torque" Add),
             effect: "dry friction on the motor shaft",
             source: "ASSUMED: wear as dry friction",
+            rate: BEARINGS,
         },
     ]
 }
@@ -104,6 +112,7 @@ fn power() -> Vec<FaultKind> {
             ),
             effect: "1: the switch never closes; two of six sectors lose their torque",
             source: "T3 Table 1.1 (open circuit)",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "shorted_switch",
@@ -117,6 +126,7 @@ fn power() -> Vec<FaultKind> {
             ),
             effect: "1: the switch is always closed; the first gate of its partner shoots through and the drive trips",
             source: "T3 Table 1.1 (short)",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "sag",
@@ -126,6 +136,7 @@ fn power() -> Vec<FaultKind> {
             places: places!("supply": "inverter.supply_scale" Lose),
             effect: "fraction of the supply voltage lost: slower, below control.undervoltage moves are refused",
             source: "T3 Table 1.1 (power connector)",
+            rate: CONNECTOR,
         },
     ]
 }
@@ -142,6 +153,7 @@ fn sensors() -> Vec<FaultKind> {
             places: places!("sensor.hall_a": "hall.stuck_high_a" Set, "sensor.hall_b": "hall.stuck_high_b" Set, "sensor.hall_c": "hall.stuck_high_c" Set),
             effect: "1: the sensor always reads high: wrong sectors, the code 111, a hall fault of the control unit",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "hall_low",
@@ -151,6 +163,7 @@ fn sensors() -> Vec<FaultKind> {
             places: places!("sensor.hall_a": "hall.stuck_low_a" Set, "sensor.hall_b": "hall.stuck_low_b" Set, "sensor.hall_c": "hall.stuck_low_c" Set),
             effect: "1: the sensor always reads low: wrong sectors, the code 000, a hall fault of the control unit",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "offset",
@@ -160,6 +173,7 @@ fn sensors() -> Vec<FaultKind> {
             places: places!("sensor.hall": "hall.offset" Add, "sensor.hall_a": "hall.offset_a" Add, "sensor.hall_b": "hall.offset_b" Add, "sensor.hall_c": "hall.offset_c" Add),
             effect: "electrical angle by which the sensors switch early: torque ripple, less torque per ampere",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "dropout",
@@ -169,6 +183,7 @@ fn sensors() -> Vec<FaultKind> {
             places: places!("sensor.hall": "hall.power_off" Pulse),
             effect: "duty of the Hall sensors' power lost: the code 000, no commutation, speed reported as zero",
             source: "N 4.5 (resolver power, here the Hall sensors')",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "proximity_on",
@@ -178,6 +193,7 @@ fn sensors() -> Vec<FaultKind> {
             places: places!("sensor.proximity_0": "proximity.on_0" Set, "sensor.proximity_25": "proximity.on_25" Set, "sensor.proximity_75": "proximity.on_75" Set, "sensor.proximity_100": "proximity.on_100" Set, "sensor.weight_on_wheels": "proximity.on_wheels" Set),
             effect: "1: the switch always reads on",
             source: "ASSUMED: the usual failure of an inductive switch",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "proximity_off",
@@ -187,6 +203,7 @@ fn sensors() -> Vec<FaultKind> {
             places: places!("sensor.proximity_0": "proximity.off_0" Set, "sensor.proximity_25": "proximity.off_25" Set, "sensor.proximity_75": "proximity.off_75" Set, "sensor.proximity_100": "proximity.off_100" Set, "sensor.weight_on_wheels": "proximity.off_wheels" Set),
             effect: "1: the switch never reads on",
             source: "ASSUMED: broken wire",
+            rate: SWITCH,
         },
     ]
 }
@@ -219,6 +236,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("screw": "friction.growth" Add),
             effect: "force added to the friction of the screw, in FF and FFM: more current, no free fall at the end",
             source: "N 6.1 (wear of the screw: insufficient lubrication, spalling)",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "efficiency_loss",
@@ -228,6 +246,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("screw": "screw.efficiency_scale" Lose, "gear_first": "gear.efficiency_first" Lose, "gear_second": "gear.efficiency_second" Lose),
             effect: "fraction of an efficiency lost; the load cannot drive back once the train's is below one half",
             source: "N 5.3 (what a jam takes from the screw; of the gears ASSUMED alike)",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "jam",
@@ -237,6 +256,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("screw": "screw.jam_force" Add),
             effect: "resistive force on the nut: the motor stalls, retries, the control unit faults",
             source: "N 4.2 and 5.3 (jam; as a force on the nut ASSUMED)",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "brake_dragging",
@@ -246,6 +266,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("brake": "brake.drag" Add),
             effect: "torque left when released",
             source: "ASSUMED: worn or swollen disc",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "brake_slipping",
@@ -255,6 +276,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("brake": "brake.torque" Lose),
             effect: "fraction of the holding torque lost: the leg creeps down when the drive is off",
             source: "ASSUMED: oil on the disc",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "brake_not_releasing",
@@ -264,6 +286,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("brake": "brake.stuck" Set),
             effect: "1: the brake stays set under power: the motor drives through it or stalls; a drag warning or a fault",
             source: "ASSUMED: open coil or stuck armature",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "release_cable_failed",
@@ -273,6 +296,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("release": "release.cable_failed" Set),
             effect: "1: the free-fall release does not open, the leg stays; seen by the lock's switch that never comes",
             source: "ASSUMED: broken or slack cable",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "lock_spring_weak",
@@ -282,6 +306,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("lock": "lock.spring_scale" Lose),
             effect: "fraction of the sleeve spring's force lost: a free fall no longer locks, the motor still works the lock",
             source: "ASSUMED: relaxed or broken spring",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "lock_not_engaging",
@@ -291,6 +316,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("lock": "lock.blocked" Set),
             effect: "1: the sleeve blocks and the down-lock does not engage: retries, then a fault",
             source: "ASSUMED: dirt under the sleeve",
+            rate: MECHANISM,
         },
         FaultKind {
             kind: "lock_not_releasing",
@@ -300,6 +326,7 @@ fn mechanical() -> Vec<FaultKind> {
             places: places!("lock": "lock.stuck" Set),
             effect: "1: the segments of an engaged lock stay: retries, then a fault",
             source: "ASSUMED: sticking segments",
+            rate: MECHANISM,
         },
     ]
 }

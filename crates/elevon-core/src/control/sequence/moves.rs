@@ -145,8 +145,10 @@ impl Sequence {
             (Phase::Unconfirmed, STOP) => self.press(p, see),
             _ => None,
         };
-        if let Some(action) = next {
-            self.begin(see, action);
+        match next {
+            Some(Move::BackOff) if self.may_be_locked() => self.rest_perhaps_locked(see),
+            Some(action) => self.begin(see, action),
+            None => {}
         }
     }
 
@@ -157,7 +159,7 @@ impl Sequence {
             return None;
         }
         self.extending = self.readings.believed(P100);
-        if !self.extending && (!self.readings.believed(P0) || self.on_wheels(p)) {
+        if !self.extending && (!self.readings.believed(P0) || self.on_wheels(p) || self.may_be_locked()) {
             return None;
         }
         self.pressed = true;

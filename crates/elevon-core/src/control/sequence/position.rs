@@ -19,6 +19,8 @@ pub struct Places {
 pub struct Position {
     pub low: f64,
     pub high: f64,
+    /// What it would be if no switch in mid-stroke had placed the nut since an end was confirmed.
+    edgeless: (f64, f64),
     counted: f64,
 }
 
@@ -60,11 +62,16 @@ impl Position {
         };
         let possible = (0..4).map(without).filter(|(low, high)| low <= high);
         let hull = possible.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or(whole);
-        Self { low: hull.0, high: hull.1, counted }
+        Self { low: hull.0, high: hull.1, edgeless: hull, counted }
     }
 
     pub fn between(&mut self, low: f64, high: f64) {
-        (self.low, self.high) = (low, high);
+        (self.low, self.high, self.edgeless) = (low, high, (low, high));
+    }
+
+    /// A switch in mid-stroke proves false: where it has placed the nut bears nothing any more.
+    pub fn forget_edges(&mut self) {
+        (self.low, self.high) = self.edgeless;
     }
 
     /// After a tick: the count has moved, and may have lost up to `lost`.
@@ -73,6 +80,7 @@ impl Position {
         self.counted = counted;
         self.low += moved - lost;
         self.high += moved + lost;
+        self.edgeless = (self.edgeless.0 + moved - lost, self.edgeless.1 + moved + lost);
     }
 
     /// By how much a switch's claim misses the interval.
@@ -88,12 +96,14 @@ impl Position {
     }
 
     /// The nut is at an edge, between `from` and `to`, where that agrees with the count to `slack`, which covers the
-    /// switches' response.
-    pub fn at_edge(&mut self, from: f64, to: f64, slack: f64) {
-        if from - self.high <= slack && self.low - to <= slack {
+    /// switches' response. False where it does not.
+    pub fn at_edge(&mut self, from: f64, to: f64, slack: f64) -> bool {
+        let agrees = from - self.high <= slack && self.low - to <= slack;
+        if agrees {
             self.low = self.low.max(from - slack).min(to + slack);
             self.high = self.high.min(to + slack).max(self.low);
         }
+        agrees
     }
 }
 

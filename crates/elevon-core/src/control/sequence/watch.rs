@@ -108,7 +108,7 @@ impl Sequence {
         } else if self.locked_at_the_stop(p) || self.retracted_at_the_stop(p) {
             // The end of the stroke itself confirms the switch: `act` takes it.
         } else if self.action == Move::Extend && (stalled || late) && self.may_be_locked() {
-            self.rest_unconfirmed(see, if self.readings.failed[P100] { PROXIMITY } else { NOT_ENGAGED });
+            self.rest_perhaps_locked(see);
         } else if self.action == Move::Extend && (late || (stalled && near)) {
             self.retry(p, see, Move::BackOff, NOT_ENGAGED);
         } else if stalled && self.action != Move::Reseat {
@@ -118,9 +118,14 @@ impl Sequence {
         }
     }
 
-    /// As far as the count goes: then a motion upwards could unlock it, whatever its switch reads.
-    fn may_be_locked(&self) -> bool {
-        self.position.high >= self.places.stroke + self.places.engage
+    /// By the count or by the lock's switch, though it be flagged: the unit lifts a leg of its own accord only where both
+    /// say that the lock is open.
+    pub(super) fn may_be_locked(&self) -> bool {
+        self.readings.on[P100] || self.position.high >= self.places.stroke + self.places.engage
+    }
+
+    pub(super) fn rest_perhaps_locked(&mut self, see: &Seen) {
+        self.rest_unconfirmed(see, if self.readings.failed[P100] { PROXIMITY } else { NOT_ENGAGED });
     }
 
     pub(super) fn stalled(&self, p: &[f64]) -> bool {

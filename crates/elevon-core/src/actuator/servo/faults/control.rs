@@ -1,6 +1,7 @@
 //! Faults of the controller and of the sensors of position.
 
 use super::{attribute, Side};
+use crate::fault::rate::{CONTROLLER, POSITION_SENSOR, SWITCH};
 use crate::fault::{Attribute, FaultKind};
 use crate::places;
 use crate::variable::Range;
@@ -36,6 +37,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("control.position": "control.position_gain_scale" Grow, "control.speed": "control.speed_gain_scale" Grow),
             effect: "relative drift of a loop gain: -0.2 means gain x 0.8",
             source: "T1 (proportional gain drift)",
+            rate: CONTROLLER,
         },
         FaultKind {
             kind: "dropout",
@@ -45,6 +47,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.power_off" Pulse),
             effect: "duty of the resolver's power lost: while off the drive sees a shaft at rest, then the position jumps back",
             source: "N 4.5",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "mismatch",
@@ -54,6 +57,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.mismatch" Add),
             effect: "amplitude lost by one resolver channel: atan2(g sin, cos), an angle error at twice the shaft frequency",
             source: "N 4.5",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "quadrature",
@@ -63,6 +67,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.quadrature" Add),
             effect: "angle by which the resolver's windings deviate from their right angle: an angle error of half of it, in the mean and at twice the shaft frequency",
             source: "closed form of the converter's arctangent; that it comes as a fault ASSUMED (deformed or displaced windings)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "channel_offset",
@@ -72,6 +77,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver.sine": "sensor.resolver.sine_offset" Add, "sensor.resolver.cosine": "sensor.resolver.cosine_offset" Add),
             effect: "offset of a demodulated resolver channel over its healthy amplitude: an angle error of as many rad once a turn of the shaft",
             source: "closed form of the converter's arctangent; that it comes as a fault ASSUMED (drift of the converter's electronics)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "offset",
@@ -81,6 +87,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.offset" Add),
             effect: "offset of the motor's position; it misplaces the commutation where the resolver gives its angle",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "offset",
@@ -90,6 +97,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder": "sensor.encoder.offset" Add),
             effect: "offset of the reported output position; the position loop feels it where control.position_feedback = encoder",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "gain",
@@ -99,6 +107,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.gain" Grow, "sensor.encoder": "sensor.encoder.gain" Grow),
             effect: "relative gain error of a position sensor; the position loop feels the encoder's where control.position_feedback = encoder, the resolver's where it is resolver",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "missing_counts",
@@ -108,6 +117,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder": "sensor.encoder.missing_counts" Add),
             effect: "fraction of the encoder's counts lost, spread evenly: the reported displacement is too short; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "dark_sectors",
@@ -117,6 +127,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder": "sensor.encoder.dark_share" Add),
             effect: "share of the encoder's disc that gives no counts: the reported position stands in a dark sector, and what was lost stays lost until the disc turns back through it or the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5 (sectors of the disc)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "interpolation",
@@ -126,6 +137,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder.first": "sensor.encoder.first_harmonic" Add),
             effect: "interpolation error once a period of the encoder's pulses, over that period (offsets of its signals); the position loop feels it where control.position_feedback = encoder",
             source: "closed form of two signals with offsets; that it comes as a fault ASSUMED (dirt, drift of the electronics)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "interpolation",
@@ -135,6 +147,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder.second": "sensor.encoder.second_harmonic" Add),
             effect: "interpolation error twice a period of the encoder's pulses, over that period (unequal amplitudes or a phase error of its signals); the position loop feels it where control.position_feedback = encoder",
             source: "closed form of two unlike signals; that it comes as a fault ASSUMED (tilt or distance of the reading head)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "resolver_short",
@@ -147,6 +160,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             ),
             effect: "fraction of a resolver winding's turns shorted: a secondary one falsifies the angle twice a turn, the excitation turns no angle until less than sensor.resolver.least_signal is left, then the drive sees a shaft at rest",
             source: "N 4.5 (windings of the resolver; amplitude alone, no phase shift: ASSUMED)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "resolver_open",
@@ -156,6 +170,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver.sine": "sensor.resolver.sine_open" Set, "sensor.resolver.cosine": "sensor.resolver.cosine_open" Set),
             effect: "1: the winding is interrupted; with one channel dead the reported angle leaps by half a turn",
             source: "N 4.5 (windings of the resolver)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "resolver_open",
@@ -165,6 +180,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver.excitation": "sensor.resolver.power_off" Set),
             effect: "1: the winding is interrupted; without excitation the shaft seems to rest",
             source: "N 4.5 (windings of the resolver)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "stuck",
@@ -174,6 +190,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.resolver": "sensor.resolver.stuck" Set, "sensor.encoder": "sensor.encoder.stuck" Set),
             effect: "1: the reading stands still at its value of the onset, afterwards it is the true one again; of the encoder the position loop feels it where control.position_feedback = encoder",
             source: "T3 Table 1.1 (position sensor)",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "stuck",
@@ -183,6 +200,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.current_a": "sensor.current.stuck_a" Set, "sensor.current_b": "sensor.current.stuck_b" Set, "sensor.current_c": "sensor.current.stuck_c" Set),
             effect: "1: the current sensor stands still at its value of the onset: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
             source: "ASSUMED: the usual failure of a sensor's electronics, in addition to gain and offset of T2",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "dead",
@@ -192,6 +210,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.encoder": "sensor.encoder.dead" Set),
             effect: "1: no counts come: the reported position stands still, and what was lost stays lost until the drive is referenced anew; the position loop feels it where control.position_feedback = encoder",
             source: "N 4.5",
+            rate: POSITION_SENSOR,
         },
         FaultKind {
             kind: "dead",
@@ -201,6 +220,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             places: places!("sensor.current_a": "sensor.current.dead_a" Set, "sensor.current_b": "sensor.current.dead_b" Set, "sensor.current_c": "sensor.current.dead_c" Set),
             effect: "1: the current sensor reports zero: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
             source: "ASSUMED: broken wire, in addition to gain and offset of T2",
+            rate: SWITCH,
         },
     ]
 }

@@ -1,6 +1,7 @@
 //! Faults of the motor's windings and magnets, of the inverter and of its current sensors.
 
 use super::attribute;
+use crate::fault::rate::{BEARINGS, CONNECTOR, MOTOR, SWITCH};
 use crate::fault::{Attribute, FaultKind};
 use crate::places;
 use crate::variable::Range;
@@ -57,48 +58,56 @@ pub fn electrical() -> Vec<FaultKind> {
             places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
             effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency; with motor.short_model = loop the turns are there, carry a current of their own, brake and heat",
             source: "T2 (fault coefficients N_j), N 5.2",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "eccentricity_static", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE,
             places: places!("motor": "motor.eccentricity_static" Add),
             effect: "fraction of the air gap by which the rotor stands out of centre, at rest; motor.eccentricity_law = published: k_j (1 + zeta cos(theta_e - phi + 2 pi (j-1)/3)), torque ripple at the electrical frequency and an EMF with a mean over a turn; periodic: k_j (1 + zeta cos(phi - 2 pi (j-1)/3)), unequal amplitudes, torque ripple at twice the electrical frequency",
             source: "T2 (eccentricity coefficient zeta, phi); periodic law ASSUMED: a phase's coils stand together",
+            rate: BEARINGS,
         },
         FaultKind {
             kind: "eccentricity_dynamic", unit: "1", range: Range::Between(0.0, 0.9), attributes: PHASE_DYNAMIC,
             places: places!("motor": "motor.eccentricity_dynamic" Add),
             effect: "fraction of the air gap by which the rotor stands out of centre, turning with the shaft: the modulation of k_j turns, too, or that of the flux (motor.eccentricity_law; both ASSUMED: the paper names the fault only)",
             source: "N 4.4 and 5.1",
+            rate: BEARINGS,
         },
         FaultKind {
             kind: "resistor_short", unit: "1", range: Range::Between(0.0, 0.5), attributes: REFERENCE,
             places: places!("motor.phase_a": "motor.tap_level_a" Add, "motor.phase_b": "motor.tap_level_b" Add, "motor.phase_c": "motor.tap_level_c" Add),
             effect: "level f of a resistor ref (1 - f)/f from a terminal to the centre tap: it draws V/R whatever the speed and leaves the winding alone",
             source: "N 4.3 (seeded winding short)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "phase_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: TOUCHING,
             places: places!("motor.phases_ab": "motor.phase_short_ab" Add, "motor.phases_bc": "motor.phase_short_bc" Add, "motor.phases_ca": "motor.phase_short_ca" Add),
             effect: "conductance of a contact between the windings of two phases: the drive feeds it with them, their torque falls, the contact heats",
             source: "T3 Table 1.1 (phase-to-phase short); place and circuit ASSUMED",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "ground_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: GROUNDED,
             places: places!("motor.phase_a": "motor.ground_short_a" Add, "motor.phase_b": "motor.ground_short_b" Add, "motor.phase_c": "motor.ground_short_c" Add),
             effect: "conductance of a contact from a winding to the drive's ground: its current returns by the link, so the phase currents no longer sum to zero",
             source: "T3 Table 1.1 (turn-to-ground short); N 4.3 (resistance from a leg to the drive's ground)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "unbalance", unit: "kg m2", range: Range::Between(0.0, 2e-3), attributes: UNBALANCE,
             places: places!("motor.rotor": "motor.unbalance_inertia" Add),
             effect: "excess inertia of a mass on one side of the rotor: inertia, gravity torque once a turn, dynamic eccentricity",
             source: "N 4.4 (mass imbalance)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "open_phase", unit: "1", range: Range::Unit, attributes: &[],
             places: places!("motor.phase_a": "motor.open_a" Set, "motor.phase_b": "motor.open_b" Set, "motor.phase_c": "motor.open_c" Set),
             effect: "1: the phase is interrupted, from its next current zero on; the other two form one loop",
             source: "T3 Table 1.1 (open circuit)",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "open_switch", unit: "1", range: Range::Unit, attributes: &[],
@@ -109,6 +118,7 @@ pub fn electrical() -> Vec<FaultKind> {
             ),
             effect: "1: the switch never closes; half waves of its phase current are missing",
             source: "T3 Table 1.1 (open circuit)",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "shorted_switch", unit: "1", range: Range::Unit, attributes: &[],
@@ -119,42 +129,49 @@ pub fn electrical() -> Vec<FaultKind> {
             ),
             effect: "1: the switch is always closed; the first gate of its partner shoots through and the drive trips",
             source: "T3 Table 1.1 (short)",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "demagnetisation", unit: "1", range: Range::Between(0.0, 0.95), attributes: &[],
             places: places!("motor": "motor.flux_fraction" Lose),
             effect: "fraction of the magnets' flux lost: more current for the same torque, higher no-load speed",
             source: "ASSUMED: uniform loss of flux, the usual first model",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "local_demagnetisation", unit: "1", range: Range::Unit, attributes: POLE,
             places: places!("motor": "motor.pole_loss" Add),
             effect: "fraction of the flux that one pole pair has lost: k_j dips once a turn while it passes, EMF sidebands at the electrical frequency +- multiples of the shaft's",
             source: "N 4.3 (demagnetised permanent magnets); window and place of the coils ASSUMED",
+            rate: MOTOR,
         },
         FaultKind {
             kind: "sag", unit: "1", range: Range::Between(0.0, 0.99), attributes: &[],
             places: places!("supply": "inverter.supply_scale" Lose),
             effect: "fraction of the supply voltage lost: less speed and torque reserve",
             source: "T3 Table 1.1 (power connector)",
+            rate: CONNECTOR,
         },
         FaultKind {
             kind: "connector_open", unit: "1", range: Range::Unit, attributes: &[],
             places: places!("supply": "inverter.connector_open" Set),
             effect: "1: the power connector is open; the link's capacitor alone feeds the bridge: it empties under load and rises when the motor brakes (no brake chopper)",
             source: "T3 Table 1.1 (power connector open, 6.64e-7 per hour)",
+            rate: CONNECTOR,
         },
         FaultKind {
             kind: "gain", unit: "1", range: Range::Between(-1.0, 10.0), attributes: &[],
             places: places!("sensor.current_a": "sensor.current.gain_a" Grow, "sensor.current_b": "sensor.current.gain_b" Grow, "sensor.current_c": "sensor.current.gain_c" Grow),
             effect: "relative gain error of a current sensor: the drive controls the wrong current, ripple at twice the electrical frequency",
             source: "T2 (acquisition)",
+            rate: SWITCH,
         },
         FaultKind {
             kind: "offset", unit: "A", range: Range::Any, attributes: &[],
             places: places!("sensor.current_a": "sensor.current.offset_a" Add, "sensor.current_b": "sensor.current.offset_b" Add, "sensor.current_c": "sensor.current.offset_c" Add),
             effect: "offset of a current sensor: torque ripple at the electrical frequency",
             source: "T2 (acquisition)",
+            rate: SWITCH,
         },
     ]
 }
