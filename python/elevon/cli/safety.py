@@ -46,12 +46,13 @@ def safety(
         say(f"report: {safety_report(result, model, date=date).save(pages[0], force=force)}")
         write_text(pages[1], text.dumps(values, indent=1) + "\n", force=force)
     code = 0 if values["status"] == "pass" else 1
-    return Answer(values, lambda: _print(values, result.runs), code)
+    return Answer(values, lambda: _print(values), code)
 
 
-def _print(values: dict[str, Any], runs: int) -> None:
-    situations = sum(item["rows"] for item in values["hazards"])
-    answer(f"{values['status'].upper()}: {situations} of {runs} situations show a hazard")
+def _print(values: dict[str, Any]) -> None:
+    answer(
+        f"{values['status'].upper()}: {values['unsafe']} of {values['runs']} situations show a hazard"
+    )
     print_table(
         ["hazard", "rows", "listed", "by one failure", "per hour"],
         [[item["name"], *(str(item[key]) for key in ("rows", "listed", "single")),

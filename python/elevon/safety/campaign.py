@@ -16,7 +16,7 @@ from elevon.progress import Progress
 from elevon.report.checks import Check, CheckedResult
 from elevon.safety.hazards import HAZARDS, RECORD, observe
 from elevon.safety.reasons import reason
-from elevon.safety.rows import Failure, Row, population, triples
+from elevon.safety.rows import Row, population, triples
 
 WIRING = "landing_gear"
 CHUNK = 256
@@ -88,8 +88,8 @@ class HazardResult(Plain):
     @property
     def per_hour(self) -> float:
         """Sum over the different combinations of the product of their rates, one hour each."""
-        combinations = {item.row.combination: item.row.faults for item in self.findings}
-        return sum(math.prod(map(_rate, faults)) for faults in combinations.values())
+        combinations = {item.row.combination: item.row for item in self.findings}
+        return sum(per_hour(row) for row in combinations.values())
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class SafetyResult(CheckedResult):
         Of surroundings and triples.
     """
 
-    COMPUTED = ("rows",)
+    COMPUTED = ("rows", "unsafe")
 
     runs: int
     repeated: Annotated[int, key("repeated_at_high")]
@@ -125,6 +125,11 @@ class SafetyResult(CheckedResult):
     def rows(self) -> list[HazardRow]:
         """What shows a hazard, hazard by hazard."""
         return [finding for item in self.hazards for finding in item.findings]
+
+    @property
+    def unsafe(self) -> int:
+        """Situations that show a hazard, listed or not."""
+        return len({id(finding.row) for finding in self.rows})
 
 
 def safety(
@@ -228,9 +233,16 @@ def judged(
             yield from ((name, row, time) for name, time in observe(recording, row).items())
 
 
-def _rate(failure: Failure) -> float:
-    """Return how often an hour it comes, by the catalogue."""
-    return find_record(failure.kind, failure.place, WIRING).rate
+def per_hour(row: Row) -> float:
+    """Return how often an hour the failures of a row come together, by the catalogue's rates.
+
+    Parameters
+    ----------
+    row : Row
+        An upper bound: a failure is taken to last the hour.
+    """
+    rates = [find_record(fault.kind, fault.place, WIRING).rate for fault in row.faults]
+    return math.prod(rates)
 
 
 def _share(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from elevon.recording.states import code_names
 from elevon.report import Report, ReportTable
 from elevon.report.figures import new_figure
 from elevon.reproduce.provenance import provenance
-from elevon.safety.campaign import HazardRow, SafetyResult
+from elevon.safety.campaign import HazardRow, SafetyResult, per_hour
 from elevon.safety.hazards import HAZARDS, RECORD
 
 
@@ -28,15 +29,14 @@ def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None 
     date : str, optional
         Printed instead of the day's.
     """
-    situations = sum(len(item.findings) for item in result.hazards)
     report = Report(
         f"Safety of {actuator.name}",
         f"{result.runs} situations with up to three failures, {result.repeated} of them again at "
-        f"high fidelity. {situations} show a hazard.",
+        f"high fidelity. {result.unsafe} show a hazard.",
         date=date,
     )
     report.fact("Situations", str(result.runs), "at low fidelity")
-    report.fact("Hazards shown", str(situations), "rows, each hazard counted")
+    report.fact("With a hazard", str(result.unsafe), "listed or not")
     single = sum(item.single for item in result.hazards if item.severe)
     report.fact("Severe by one failure", str(single), "must be none")
     _hazards(report, result)
@@ -54,7 +54,14 @@ def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None 
 def _hazards(report: Report, result: SafetyResult) -> None:
     texts = {item.name: item.text for item in HAZARDS}
     rows: list[list[object]] = [
-        [item.name, texts[item.name], len(item.findings), item.listed, item.single, item.per_hour]
+        [
+            item.name,
+            texts[item.name],
+            len(item.findings),
+            item.listed,
+            item.single,
+            item.per_hour or None,
+        ]
         for item in result.hazards
     ]
     section = report.section("Hazards")
@@ -72,21 +79,25 @@ def _hazards(report: Report, result: SafetyResult) -> None:
 def _worst(report: Report, actuator: Actuator, name: str, findings: tuple[HazardRow, ...]) -> None:
     """A hazard's combinations, why no sensor could tell, and its worst row over time."""
     section = report.section(name[0].upper() + name[1:])
+    rows = Counter(item.row.combination for item in findings)
     combinations = {item.row.combination: item for item in findings}
-    rows: list[list[object]] = [
-        [key, item.fidelity, item.time, item.reason or "not listed"]
+    lines: list[list[object]] = [
+        [key, rows[key], per_hour(item.row), item.reason or "not listed"]
         for key, item in combinations.items()
     ]
     section.table(
-        ReportTable(["Failures", "Fidelity", "From [s]", "Why no sensor could tell"], rows,
-                    formats=("", "", ".2f", ""))
+        ReportTable(["Failures", "Rows", "Per hour", "Why no sensor could tell"], lines,
+                    formats=("", "", ".1e", ""))
     )  # fmt: skip
     unlisted = [item for item in findings if not item.reason]
     chosen = min(unlisted or findings, key=lambda item: len(item.row.faults))
     recording = _again(actuator, chosen)
     section.figure(
-        _timeline(recording, chosen), f"{chosen.row.combination}. {chosen.row.situation}"
+        _timeline(recording, chosen, actuator.wiring),
+        f"{chosen.row.combination}. {chosen.row.situation}. {chosen.fidelity.capitalize()} "
+        f"fidelity; the hazard begins at the dotted line, {chosen.time:.2f} s.",
     )
+    section.text("What the crew sees:")
     section.points(_messages(recording, actuator.wiring))
 
 
@@ -96,27 +107,42 @@ def _again(actuator: Actuator, finding: HazardRow) -> Recording:
     return simulate(actuator, finding.row.scenario(), fidelity=finding.fidelity, record=[RECORD])
 
 
-def _timeline(recording: Recording, finding: HazardRow) -> Any:
-    time = recording["state"].time
-    with new_figure(2, sharex=True) as (figure, (upper, lower)):
-        upper.plot(time, 1e3 * recording["output_position"].values)
-        upper.set_ylabel("ram [mm]")
-        upper.axvline(finding.time, linestyle=":")
-        lower.step(time, recording["state"].values, where="post", label="state displayed")
-        lower.step(time, recording["locked"].values, where="post", label="lock engaged")
-        lower.set_xlabel("time [s]")
-        lower.legend()
+def _timeline(recording: Recording, finding: HazardRow, wiring: str) -> Any:
+    """Ram, state displayed and true lock over time; only states that occur have a line."""
+    time, states = recording["state"].time, recording["state"].values
+    occurring = sorted({int(value) for value in states})
+    names = code_names(wiring, "state")
+    with new_figure(3, sharex=True) as (figure, (ram, state, lock)):
+        ram.plot(time, 1e3 * recording["output_position"].values)
+        ram.set_ylim(-10.0, 280.0)
+        ram.set_ylabel("ram [mm]")
+        state.step(time, [occurring.index(int(value)) for value in states], where="post")
+        state.set_yticks(range(len(occurring)), [names[code] for code in occurring])
+        state.set_ylabel("displayed")
+        lock.step(time, recording["locked"].values, where="post")
+        lock.set_yticks((0, 1), ("open", "engaged"))
+        lock.set_ylabel("lock")
+        lock.set_xlabel("time [s]")
+        for axes in (ram, state, lock):
+            axes.axvline(finding.time, linestyle=":")
     return figure
+
+
+_SEEN = {
+    "state": "", "warning_code": "warning: ", "fault_code": "fault: ",
+    "command_refused": "refused: ",
+}  # fmt: skip
+"""What is displayed to the crew, and how a line of it begins."""
 
 
 def _messages(recording: Recording, wiring: str) -> list[str]:
     """What the crew sees, in order."""
     lines: list[tuple[float, str]] = []
-    for signal in ("state", "warning_code", "fault_code"):
+    for signal, kind in _SEEN.items():
         channel, names = recording[signal], code_names(wiring, signal)
         edges = np.flatnonzero(np.diff(channel.values)) + 1
         lines += [
-            (float(channel.time[index]), f"{names.get(int(channel.values[index]), 'none')}")
+            (float(channel.time[index]), f"{kind}{names.get(int(channel.values[index]), 'none')}")
             for index in (0, *edges)
             if signal == "state" or channel.values[index] > 0.0
         ]

@@ -120,9 +120,15 @@ class Row:
                      for key, value in fault.profile)
             for fault in self.faults
         )  # fmt: skip
+        spans = ", ".join(
+            f"from {begin:g} s" + (f" to {end:g} s" if end < self.duration else "")
+            for begin, end in self.wheels
+        )
+        shares = ", ".join(f"{share:g} of it at {time:g} s" for time, share in self.supply[1:-1])
         return (
-            f"{self.group}: from {1e3 * self.start:g} mm, {steps}; {courses}; {supply:g} V, "
-            f"{factor:g} g, {temperature:g} deg C"
+            f"{self.group}: from {1e3 * self.start:g} mm, {steps}; {courses}; {supply:g} V"
+            f"{f' ({shares})' if shares else ''}, {factor:g} g, {temperature:g} deg C"
+            f"{f', weight on wheels {spans}' if spans else ''}"
         )
 
     @property
