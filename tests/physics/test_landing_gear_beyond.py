@@ -336,6 +336,13 @@ def test_one_switch_in_a_fall_is_never_a_false_lock(switch: str, state: str, tim
         assert rec.final["state"] == LOCKED
 
 
+def test_a_stuck_home_switch_does_not_bar_the_lock_at_high() -> None:
+    """The switching model, as the rows above."""
+    rec = gear((0.1, "free_fall"), duration=8.0, faults=[stuck("0")], fidelity="high")
+    assert rec.final["locked"] == 1.0
+    assert rec.final["state"] == LOCKED
+
+
 def test_the_slowest_healthy_fall_is_shown_and_never_early() -> None:
     """At -40 C and at 1 g; the light comes after the longest healthy last quarter."""
     for values in ({}, {"lubricant.temperature": "-40 degC"}, {"load.factor": 3.5}):
@@ -344,9 +351,10 @@ def test_the_slowest_healthy_fall_is_shown_and_never_early() -> None:
         assert not false_end(rec)
 
 
-def test_a_failed_cable_does_not_bar_the_motor() -> None:
+@BOTH
+def test_a_failed_cable_does_not_bar_the_motor(fidelity: str) -> None:
     """Nothing has moved in the longest fall: the motor may extend."""
-    rec = gear((0.1, "free_fall"), (12.0, "extend"), duration=20.0,
+    rec = gear((0.1, "free_fall"), (10.5, "extend"), duration=18.5, fidelity=fidelity,
                faults=["release_cable_failed@release=1"])  # fmt: skip
     assert rec.final["state"] == LOCKED
     assert rec.final["locked"] == 1.0
