@@ -1,4 +1,4 @@
-"""What a prognosis costs: an update with 2 000 particles, a prediction, and the tables before them.
+"""What a prognosis costs: an update, a prediction, and the tables before them.
 
     python benchmarks/prognosis.py
 
@@ -9,7 +9,7 @@ and processor seconds; limits: 1 s an update, 5 s a whole prediction on two core
 import time
 
 from elevon.actuator import Actuator
-from elevon.prognose import Inspection, ParticleFilter, Process, Seen, respond
+from elevon.prognose import GrowthFilter, Inspection, Process, Seen, respond
 from elevon.prognose.predict import prognosis
 from studies.prognosis.campaign import campaign_mission
 
@@ -39,10 +39,10 @@ def main():
     """Time each part."""
     mission, items = campaign_mission(), inspections()
     tables = timed("tables, 343 low runs", lambda: respond(Actuator.load("torino-rotary"), mission))
-    flt = ParticleFilter(Process(tables), count=2000)
+    flt = GrowthFilter(Process(tables))
     for item in items[:-1]:
         flt.update(item)
-    timed("one update, 2000 particles", lambda: flt.update(items[-1]))
+    timed("one update", lambda: flt.update(items[-1]))
     timed("look ahead, 2000 samples", lambda: prognosis(flt, mission, items))
 
 

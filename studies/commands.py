@@ -41,6 +41,8 @@ _PROCESSES = Annotated[
     int | None, typer.Option("--processes", min=1, help="Side by side; default: all processors.")
 ]
 _HISTORIES = Annotated[int, typer.Option("--histories", min=3, help="Lives, over three faults.")]
+_LIVES = Annotated[int, typer.Option("--lives", min=1, help="Lives of each form and fault.")]
+_SPECIMENS = Annotated[int, typer.Option("--specimens", min=0, help="Virkler's cracks.")]
 _MEASURED = Annotated[
     bool, typer.Option("--measured", help="Inspections measure the requirements, too.")
 ]
@@ -147,6 +149,11 @@ def _show_saved(values: Values, _result: Any) -> None:
     answer(f"the fixed order that proves best here: {best['tests']:.2f} tests: {best['order']}")
 
 
+def _show_foreign(values: Values, _result: Any) -> None:
+    columns = ("density", "form", "method", "lives", "accuracy", "coverage", "width", "off_law")
+    print_columns(values["rows"], columns, "remaining lives, 50 to 90 % of life")
+
+
 def _show_lives(values: Values, result: Any) -> None:
     columns = ("law", "histories", "accuracy", "coverage", "horizon", "unscented_accuracy",
                "unaided_accuracy")  # fmt: skip
@@ -245,6 +252,19 @@ _STUDIES = (
             "measured": (_MEASURED, False),
         },
         show=_show_lives,
+    ),
+    PublishedCase(
+        "foreign",
+        "Predict lives whose growth no law describes, beside methods without a law.",
+        "foreign growth",
+        "studies.foreign:study_foreign",
+        page="studies.foreign.page:foreign_report",
+        options={
+            "lives": (_LIVES, 7),
+            "specimens": (_SPECIMENS, 68),
+            "processes": (_PROCESSES, None),
+        },
+        show=_show_foreign,
     ),
 )  # fmt: skip
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from elevon.logs.read import read_log as read_log
     from elevon.nexttest.door import next_test as next_test
     from elevon.prognose.door import fleet as fleet
+    from elevon.prognose.door import next_inspection as next_inspection
     from elevon.prognose.door import predict as predict
     from elevon.recording import Channel as Channel
     from elevon.recording import Clock as Clock
@@ -53,6 +54,7 @@ _PUBLIC = {
     "fleet": "elevon.prognose.door",
     "monitor": "elevon.diagnose.door",
     "next_test": "elevon.nexttest.door",
+    "next_inspection": "elevon.prognose.door",
     "predict": "elevon.prognose.door",
     "read_log": "elevon.logs.read",
     "response": "elevon.doors",

@@ -33,6 +33,7 @@ _KINDS = {
     "linear-model": "elevon.response.linear:LinearModel",
     "loop-response": "elevon.response.loop:LoopResponse",
     "monitoring": "elevon.diagnose.monitor.answer:Monitoring",
+    "next-inspection": "elevon.prognose.next_inspection:NextInspection",
     "next-test": "elevon.nexttest.choose:NextTest",
     "prognosis": "elevon.prognose.answer:Prognosis",
     "response": "elevon.response.estimate:FrequencyResponse",

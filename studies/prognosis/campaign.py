@@ -16,17 +16,15 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose import (
+    GrowthFilter,
     Inspection,
     Mission,
-    ParticleFilter,
     Process,
     ResponseTables,
-    UnscentedFilter,
     respond,
 )
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.metrics import Track
-from elevon.prognose.particle import resampled
 from elevon.prognose.predict import LEVEL
 from elevon.prognose.process import UnitPopulation
 from elevon.progress import Progress
@@ -182,7 +180,6 @@ def predicted(
         mission.requirement[_first(truth, mission)].name,
         track,
         _unaided(response, mission, seen, truth, seed),
-        _by_sigma_points(response, mission, seen, truth.life.end, seed),
         seconds,
     )
 
@@ -212,7 +209,7 @@ def tracked(
     seconds : float
         Longest processor time of one.
     """
-    flt = ParticleFilter(Process(response), seed=seed)
+    flt = GrowthFilter(Process(response), seed=seed)
     seen: list[Inspection] = []
     rows: list[list[float]] = []
     longest, wait, end = 0.0, plan.interval, inspector.truth.life.end
@@ -224,7 +221,7 @@ def tracked(
         begin = clock.process_time()
         flt.update(seen[-1])
         rng = np.random.default_rng([20, seed])
-        units = resampled(flt.units, _SAMPLES, rng)
+        units = flt.drawn(_SAMPLES, rng)
         rows.append(_remaining(flt.process, units, mission, rng))
         longest = max(longest, clock.process_time() - begin)
         wait = plan.wait(rows[-1][0])
@@ -241,23 +238,6 @@ def _remaining(
 def _track(seen: Sequence[Inspection], rows: Sequence[Sequence[float]], end: float) -> Track:
     low, median, high = np.array(rows).reshape(-1, 3).T
     return Track(np.array([item.usage for item in seen]), median, low, high, end)
-
-
-def _by_sigma_points(
-    response: ResponseTables, mission: Mission, seen: Sequence[Inspection], end: float, seed: int
-) -> Track:
-    """Return the unscented filter's predictions, at the last inspection before each of `SHARES`."""
-    flt = UnscentedFilter(Process(response))
-    usage = np.array([item.usage for item in seen])
-    visits = set(np.searchsorted(usage, np.array(SHARES) * end, side="right") - 1)
-    rows, at = [], []
-    for k, item in enumerate(seen):
-        flt.update(item)
-        if k in visits:
-            rng = np.random.default_rng([22, seed])
-            rows.append(_remaining(flt.process, flt.sampled(_SAMPLES, rng), mission, rng))
-            at.append(item)
-    return _track(at, rows, end)
 
 
 def _quantiles(remaining: Floats) -> list[float]:
@@ -284,7 +264,7 @@ def _unaided(
     units = process.start(_SAMPLES, rng)
     others = [k for k, law in enumerate(process.laws) if law.name != truth.law]
     units.active[:, others] = False
-    units = units.without_dormant()
+    units = replace(units, damage=np.where(units.active, units.damage, 0.0))
     life = _quantiles(look_ahead(process, units, mission.usage, rng).end)
     rows = [[max(value - item.usage, 0.0) for value in life] for item in seen]
     return _track(seen, rows, truth.life.end)

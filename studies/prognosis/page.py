@@ -25,11 +25,11 @@ def prognosis_report(result: PrognosisResult, *, seed: int, date: str | None = N
     section = report.section("By law of growth")
     rows = [
         [r["law"], r["histories"], r["accuracy"], *(r[_key(s)] for s in SHARES), r["coverage"],
-         r["horizon"], r["unscented_accuracy"], r["unaided_accuracy"]]
+         r["horizon"], r["unaided_accuracy"]]
         for r in result.summary()
     ]  # fmt: skip
     columns = ["law", "histories", "mean", *(f"{s:.0%}" for s in SHARES)]
-    columns += ["coverage", "horizon (20 %)", "sigma points", "laws alone"]
+    columns += ["coverage", "horizon (20 %)", "laws alone"]
     section.table(
         ReportTable(columns, rows, "Relative accuracy by share of life; horizon: median, strict.",
               digits=3)

@@ -25,7 +25,7 @@ __all__ = ["SHARES", "PrognosisResult", "UnitResult"]
 SHARES = (0.5, 0.6, 0.7, 0.8, 0.9)
 _ACCURACY = 0.85
 _COVERAGE = (0.80, 0.97)
-_TRACKS = ("track", "unaided", "unscented")
+_TRACKS = ("track", "unaided")
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,6 @@ class UnitResult:
         By particles.
     unaided : Track
         By the laws alone, without a diagnosis: what a prediction must beat.
-    unscented : Track
-        By the unscented filter, from the inspections that `SHARES` ask for.
     seconds : float
         Largest processor time of an update and a look ahead.
     """
@@ -55,7 +53,6 @@ class UnitResult:
     first: str
     track: Track
     unaided: Track
-    unscented: Track
     seconds: float
 
     def noted(self) -> dict[str, Any]:
@@ -183,7 +180,6 @@ class PrognosisResult:
                     "accuracy": self.accuracy(law),
                     "accuracy_interval": [self.accuracy(law) - half, self.accuracy(law) + half],
                     "unaided_accuracy": self.accuracy(law, "unaided"),
-                    "unscented_accuracy": self.accuracy(law, "unscented"),
                     "coverage": hits,
                     "coverage_interval": list(wilson(hits, len(chosen))),
                     "horizon": float(np.median([prognostic_horizon(u.track) for u in chosen])),

@@ -31,6 +31,7 @@ __all__ = [
     "InspectionError",
     "Inspector",
     "UnitTruth",
+    "seen_as",
     "true_unit",
 ]
 
@@ -220,14 +221,12 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
     response = respond(
         base.with_values(unit, source="truth"), reduced, laws=acting, fidelity="high"
     )
-    process = Process(response, drift=0.0)
+    process = Process(response, wander=False)
     start = process.start(10, rng).picked(np.array([0]))
     factor = _FACTOR[0] + _FACTOR[1] * rng.standard_normal((1, 1))
     life = run_to_failure(
         process,
-        replace(
-            start, growth=factor, form=np.zeros((1, 1)), active=np.ones((1, 1), dtype=np.bool_)
-        ),
+        replace(start, growth=factor, row=0 * start.row, active=np.ones((1, 1), dtype=np.bool_)),
         rng,
     )
     known = base.with_values(calibrated, source="calibration")
@@ -281,7 +280,7 @@ class Inspector:
         """Return what an inspection at a use says."""
         severity = float(self.truth.life.at(usage)[0])
         seen = {
-            law.key: _seen(
+            law.key: seen_as(
                 law,
                 severity if law.name == self.truth.law else 0.0,
                 self._common[law.name],
@@ -306,7 +305,7 @@ class Inspector:
         return measured
 
 
-def _seen(
+def seen_as(
     law: Law, severity: float, common: tuple[float, float, float], rng: np.random.Generator
 ) -> Seen:
     """Return what a diagnosis says, read as `elevon predict` reads it, its edges included."""

@@ -58,7 +58,7 @@ def test_the_picture_moves_with_the_simulated_motion(base):
 def test_the_pin_stays_within_its_fork():
     swing = 7.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 101))
     gap = 0.5 * np.sign(np.cos(np.linspace(0.0, 2.0 * np.pi, 101)))
-    markup = str(mechanism([("x", Motion(swing, swing + gap, swing, swing, 1.0))]))
+    markup = str(mechanism([("x", Motion(swing, swing + gap, swing, swing, 1.0, 0.0))]))
     angles = [
         np.array([float(v.split()[0]) for v in text.split(";")])
         for text in re.findall(r'rotate"[^>]*values="([^"]*)"', markup)

@@ -184,6 +184,9 @@ RECIPES = {
     "predict": Recipe(("history", *ROTARY, "--mission", "mission.toml", "--particles", "500",
                        "--report", "rul.html", "--force"), {"history": "@history"}, long=True,
                       points=8, code=(0, 1)),
+    "next-inspection": Recipe(
+        ("history", *ROTARY, "--mission", "mission.toml", "--particles", "500", "--report",
+         "look.html", "--force"), {"history": "@history"}, long=True, points=8, code=(0, 1)),
     "safety": Recipe(("pisa-landing-gear", "--every", "8000", "--out", "out", "--force"),
                      code=(0, 1), long=True, points=8),
     "fleet": Recipe(("history", "other", *ROTARY, "--mission", "mission.toml", "--report",

@@ -28,4 +28,4 @@ def test_the_actuator_as_a_model_of_progpy(monkeypatch):
     names = {}
     exec(PROGPY, names)
     assert min(names["result"].event_states[-1].values()) == pytest.approx(0.0, abs=0.02)
-    assert len(names["units"].weight) == 2000
+    assert len(names["units"]) == 2000

@@ -84,7 +84,7 @@ def test_the_end_of_life_is_that_of_the_closed_form(power):
     unit = process(law(1e-3, power=power), limits=(2.0,))
     rng = np.random.default_rng(0)
     units = unit.start(10, rng)
-    units = replace(units, growth=0.0 * units.growth, form=0.0 * units.form)
+    units = replace(units, growth=0.0 * units.growth)
     future = look_ahead(unit, units, Usage(), rng)
     np.testing.assert_allclose(future.end, end(1e-3, 2.0, power), rtol=1e-4)
     life = run_to_failure(unit, units.picked(np.array([0])), rng)

@@ -44,11 +44,11 @@ class TestWithProgpy:
         back = from_samples(to_samples(units, unit), unit, usage=units.usage)
         np.testing.assert_array_equal(back.damage, units.damage)
         np.testing.assert_array_equal(back.active, units.active)
-        np.testing.assert_array_equal(back.coefficients[:, 1], units.coefficients[:, 1])
+        np.testing.assert_array_equal(back.row, units.row)
         np.testing.assert_allclose(back.growth[back.active], units.growth[units.active])
         with pytest.raises(InputError, match="damage friction"):
             from_samples([{"damage backlash@transmission": 0.0, "growth backlash@transmission": 0.0,
-                           "form backlash@transmission": 0.0}], unit)  # fmt: skip
+                           "row backlash@transmission": 0.0}], unit)  # fmt: skip
 
     def test_its_monte_carlo_predicts_the_ends_that_ours_does(self):
         from progpy.predictors import MonteCarlo

@@ -9,7 +9,7 @@ from elevon.prognose.requirement import Requirement
 
 def law(rate=1e-3, kind="backlash", *, power=0.0, rate_spread=0.0, **fields):
     """Growth rate x (1 + damage)^power a repetition; the closed form is in `end`."""
-    fields = {"form_spread": 0.0, "highest": 4.0, **fields}
+    fields = {"form_spread": 0.0, "highest": 4.0, "only": True, **fields}
     return Law(
         name=f"law of {kind}", text="", source="", kind=kind, place="transmission", unit="1",
         rate=lambda d, _x, c: c["rate"] * (1.0 + d) ** power, drivers=("hours",),
@@ -36,5 +36,5 @@ def response(*laws, limits):
     )  # fmt: skip
 
 
-def process(*laws, limits=(1.0,), drift=0.0):
-    return Process(response(*laws, limits=limits), drift=drift)
+def process(*laws, limits=(1.0,), wander=False):
+    return Process(response(*laws, limits=limits), wander=wander)

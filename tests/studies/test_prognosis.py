@@ -38,9 +38,8 @@ def unit(law, error, number=0):
     usage = np.arange(5.0, 100.0, 5.0)
     true = 100.0 - usage
     track = Track(usage, true * (1.0 + error), 0.8 * true, 1.2 * true, 100.0)
-    near = Track(usage, 0.7 * true, 0.6 * true, 0.8 * true, 100.0)
     far = Track(usage, 3.0 * true, 2.0 * true, 4.0 * true, 100.0)
-    return UnitResult(number, law, "tracking error", track, far, near, 0.1)
+    return UnitResult(number, law, "tracking error", track, far, 0.1)
 
 
 def inspected(truth, count=1000, **options):
@@ -141,7 +140,6 @@ def test_the_figures_are_those_of_the_tracks():
     assert good.accuracy() == pytest.approx(0.925, abs=1e-6)
     assert good.accuracy("insulation") == pytest.approx(0.95, abs=1e-6)
     assert good.accuracy(track="unaided") == pytest.approx(-1.0)
-    assert good.accuracy("gear_wear", "unscented") == pytest.approx(0.7)
     assert good.covered() == 1.0
     failed = [check.name for check in good.checks if not check.passed]
     assert failed == ["coverage of the 90 % interval, at most"]

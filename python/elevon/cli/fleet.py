@@ -51,14 +51,18 @@ def _rows(plan: FleetPlan) -> list[tuple[str, ...]]:
     return [
         (
             str(row["unit"]),
-            f"{row['rul']:.0f}",
-            f"{row['interval'][0]:.0f} to {row['interval'][1]:.0f}",
-            f"{row['alone']:.0f}",
-            f"{row['visit']:.0f}",
-            f"{row['p_failed_before']:.3f}",
+            _use(row["rul"]),
+            " to ".join(_use(value) for value in row["interval"]),
+            _use(row["alone"]),
+            _use(row["visit"]),
+            "-" if row["p_failed_before"] is None else f"{row['p_failed_before']:.3f}",
         )
         for row in plan.table
     ]
+
+
+def _use(value: float | None) -> str:
+    return "no end in sight" if value is None else f"{value:.0f}"
 
 
 def _print(plan: FleetPlan) -> None:

@@ -176,6 +176,37 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
 
 
 @command(app)
+def laws(
+    actuator: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[ACTUATOR]",
+            help="Only the laws of faults that this actuator has.",
+            autocompletion=completion.actuators,
+        ),
+    ] = None,
+) -> Answer:
+    """List the laws by which faults grow with use: fault, unit, what drives them, source."""
+    from elevon.actuator import Actuator
+    from elevon.prognose.laws import LAWS, laws_of
+
+    known = LAWS if actuator is None else laws_of(Actuator.load(actuator).wiring)
+    rows = [
+        {
+            "law": law.name,
+            "fault": law.key,
+            "unit": law.unit,
+            "drivers": list(law.drivers),
+            "coefficients": {n: f"{c.value:g} {c.unit}" for n, c in law.coefficients.items()},
+            "text": law.text,
+            "source": law.source,
+        }
+        for law in known.values()
+    ]
+    return _answer("laws", rows, ("law", "fault", "unit", "drivers", "text"))
+
+
+@command(app)
 def waveforms() -> Answer:
     """List the waveforms of commands and loads with their parameters (* = must be given)."""
     from elevon.waveforms import wave_records

@@ -30,7 +30,7 @@ def predict(
         typer.Option("--survive", metavar="N", help="Probability of the next N; repeatable."),
     ] = None,
     particles: Annotated[
-        int, typer.Option("--particles", min=100, max=100_000, help="Of the filter.")
+        int, typer.Option("--particles", min=100, max=100_000, help="Possible units drawn.")
     ] = 2000,
     snapshots: Annotated[
         bool, typer.Option("--snapshots", help="Correct the tables by runs at high fidelity.")

@@ -22,7 +22,7 @@ class CommandEntry:
 #: Modules whose name is a word of Python.
 _MODULES = {"import": "import_log"}
 _HELP = {
-    "list": "List actuators, signals, parameters, faults, waveforms, features.",
+    "list": "List actuators, signals, parameters, faults, laws, waveforms, features.",
     "show": "Show an actuator: parameters, sources, block diagram.",
     "new": "Write a commented file for an actuator of your own.",
     "check": "Report all that is wrong with a set or scenario file.",
@@ -43,6 +43,7 @@ _HELP = {
     "diagnose": "Say what is wrong, where, how bad, how sure.",
     "monitor": "Watch a unit's stream; alarm when a fault begins.",
     "predict": "Say how long a unit will do what it must.",
+    "next-inspection": "Say when to look at a unit again, and with which test.",
     "diagnose-train": "Train the surrogate that diagnose --method surrogate asks.",
     "fleet": "Group the maintenance of several units.",
     "next-test": "Propose the test that tells most about what is ambiguous.",

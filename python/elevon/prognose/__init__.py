@@ -7,29 +7,27 @@
 """
 
 from elevon.prognose.answer import Prognosis
+from elevon.prognose.growth import GrowthFilter
 from elevon.prognose.law import Coefficient, Law
 from elevon.prognose.laws import LAWS
 from elevon.prognose.mission import Mission
 from elevon.prognose.observation import Inspection, Seen, inspection
-from elevon.prognose.particle import ParticleFilter
 from elevon.prognose.predict import predict
 from elevon.prognose.process import Process
 from elevon.prognose.respond import respond
 from elevon.prognose.response import ResponseTables
-from elevon.prognose.unscented import UnscentedFilter
 
 __all__ = [
     "LAWS",
     "Coefficient",
+    "GrowthFilter",
     "Inspection",
     "Law",
     "Mission",
-    "ParticleFilter",
     "Process",
     "Prognosis",
     "ResponseTables",
     "Seen",
-    "UnscentedFilter",
     "inspection",
     "predict",
     "respond",

@@ -35,6 +35,8 @@ class KnownFault(Plain):
         Inspections that saw the fault.
     growing : float
         Probability that it grows; the factor is that of the futures in which it does.
+    growth : mapping of str to float
+        Probability of each way of growth: the law's, and those of no physics.
     """
 
     kind: str
@@ -47,6 +49,7 @@ class KnownFault(Plain):
     factor_interval: tuple[float, float]
     inspections: int
     growing: Annotated[float, key("p_growing")] = 1.0
+    growth: Annotated[Mapping[str, float], key("p_growth")] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ class Prognosis(Result):
     seconds : dict of str to float
         Time of ``tables``, ``updates``, ``prediction``.
     off_law : tuple of OffLaw
-        Diagnoses more than three deviations from what was expected.
+        Faults whose last diagnoses, or all, contradict the law, with the greatest deviation.
     horizons : tuple of float
         N of `p_survive`; empty: round ones.
     page : callable or None

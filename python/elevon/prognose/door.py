@@ -1,9 +1,9 @@
-"""The doors `elevon.predict` and `elevon.fleet`."""
+"""The doors `elevon.predict`, `elevon.next_inspection` and `elevon.fleet`."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.errors import InputError
 from elevon.prognose.answer import Prognosis
+from elevon.prognose.assumptions import assumptions
 from elevon.prognose.fleet import Costs, FleetPlan, plan_fleet
 from elevon.prognose.history import History, diagnosed, read_history
 from elevon.prognose.mission import Mission
+from elevon.prognose.next_inspection import NextInspection
+from elevon.prognose.next_inspection import next_inspection as when_to_look
 from elevon.prognose.observation import Inspection, inspection
 from elevon.prognose.page import prognosis_page
 from elevon.prognose.predict import predict as look_ahead
@@ -59,7 +62,7 @@ def predict(
     survive : sequence of float
         N of the probability to survive the next N; default: round ones.
     particles : int
-        Of the filter.
+        Possible units that are flown to their ends.
     snapshots : bool
         Whether the tables are corrected by runs at high fidelity.
     seed : int
@@ -107,18 +110,79 @@ def _one(
 ) -> Prognosis:
     if isinstance(history, History):
         serial = serial or history.serial
-        read = diagnosed(history, model, progress=progress)
-        seen = read.inspections(tables.laws, tables.units_by_name)
-    else:
-        seen = [_inspected(item, tables) for item in history]
+    seen = _inspections(history, model, tables, progress)
     result = look_ahead(
         seen, model, mission, response=tables, particles=particles, seed=seed, serial=serial
     )
 
     def page(answer: Prognosis, date: str | None) -> Report:
-        return prognosis_page(answer, seen, tables.laws, actuator=model.name, date=date)
+        assumed = assumptions(seen, tables, mission.usage, level=answer.level, seed=seed)
+        return prognosis_page(
+            answer, seen, tables.laws, actuator=model.name, assumed=assumed, date=date
+        )
 
     return replace(result, horizons=tuple(survive), page=page)
+
+
+def _inspections(
+    history: History | _Seen, model: Actuator, tables: ResponseTables, progress: Progress | None
+) -> list[Inspection]:
+    if not isinstance(history, History):
+        return [_inspected(item, tables) for item in history]
+    read = diagnosed(history, model, progress=progress)
+    return read.inspections(tables.laws, tables.units_by_name)
+
+
+def next_inspection(
+    history: HistoryLike,
+    actuator: ActuatorLike,
+    mission: MissionLike,
+    *,
+    risk: float = 0.01,
+    particles: int = 2000,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> NextInspection:
+    """Say when to look at a unit again, and with which test.
+
+    Parameters
+    ----------
+    history, actuator, mission, particles, seed, progress
+        As `predict`.
+    risk : float
+        Accepted probability of failing before.
+
+    Raises
+    ------
+    InputError
+        As `predict`; a risk that the futures cannot show.
+    """
+    model, flown = as_actuator(actuator), _mission(mission)
+    given = _read(history, flown)
+    tables = respond(model, flown, progress=part(progress, 0.0, 0.5))
+    seen = _inspections(given, model, tables, part(progress, 0.5, 0.8))
+    serial = given.serial if isinstance(given, History) else ""
+    result = look_ahead(
+        seen, model, flown, response=tables, particles=particles, seed=seed, serial=serial
+    )
+    assumed = assumptions(seen, tables, flown.usage, level=result.level, seed=seed)
+    test, findings = _test(given, model, part(progress, 0.8, 1.0))
+    return when_to_look(result, risk, test=test, assumed=assumed, findings=findings)
+
+
+def _test(
+    history: History | _Seen, model: Actuator, progress: Progress | None
+) -> tuple[str | None, list[str]]:
+    """Return the test that tells most after the last diagnosis; or why none is named."""
+    from elevon.nexttest.door import next_test
+
+    last: list[Diagnosis | Mapping[str, object]] = []
+    if isinstance(history, History):
+        last += [e.diagnosis for e in history.entries[-1:] if e.diagnosis and not e.logs]
+    try:
+        return next_test(model, last, progress=progress).next.name, []
+    except InputError as error:
+        return None, [f"which test to look with is not known: {error}"]
 
 
 def _inspected(item: Inspection | tuple[float, Diagnosis], tables: ResponseTables) -> Inspection:

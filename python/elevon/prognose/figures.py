@@ -28,12 +28,12 @@ def course_figure(
 ) -> Figure:
     """Draw the severities that inspections saw and those to come."""
     with new_figure(len(laws), 1, height=1.2 + 2.2 * len(laws), sharex=True) as (figure, axes):
-        far = result.usage + max(result.interval[1], 1.0) * 1.15
+        far = _far(result)
         for k, (law, axis) in enumerate(zip(laws, np.atleast_1d(axes), strict=True)):
             unit = severity_unit(law.unit)
             course = to_display(result.future.course[:, k, :], unit)
             at = result.future.at
-            near = at <= far if np.isfinite(far) else np.ones(len(at), dtype=np.bool_)
+            near = at <= far
             band = axis.fill_between(
                 at[near], course[near, 0], course[near, 2], color=COLOURS["orange"], alpha=0.25
             )
@@ -44,8 +44,17 @@ def course_figure(
             axis.set(ylabel=f"{law.kind} [{unit}]")
             axis.margins(y=0.15)
             axis.legend(loc="upper left")
+        np.atleast_1d(axes)[-1].set_xlim(0.0, far)
         np.atleast_1d(axes)[-1].set(xlabel=f"use [{result.unit}]")
     return figure
+
+
+def _far(result: Prognosis) -> float:
+    """Return where the axis of use ends: the history keeps a quarter of it at least."""
+    ends = [value for value in (*result.interval, result.median) if np.isfinite(value)]
+    ahead = 1.15 * max(ends, default=np.inf)
+    most = 3.0 * result.usage or np.inf
+    return result.usage + max(min(ahead, most, float(result.future.at[-1] - result.usage)), 1.0)
 
 
 def _draw_seen(axis: object, inspections: Sequence[Inspection], law: Law, unit: str) -> None:

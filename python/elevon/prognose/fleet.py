@@ -17,6 +17,7 @@ from elevon.results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_NEVER = 1e30  # a cost that no plan takes
 _INSTANTS = 400  # at which a visit may be, of each unit's remaining life
 
 
@@ -64,7 +65,7 @@ class FleetPlan(Result):
     units : mapping of str to Prognosis
         The fleet.
     alone : mapping of str to float
-        When each unit would be done by itself.
+        When each unit would be done by itself; without those of no end in sight.
     visits : tuple of Visit
         Together.
     cost, cost_alone : float
@@ -95,30 +96,36 @@ class FleetPlan(Result):
     @property
     def table(self) -> list[dict[str, Any]]:
         """One row a unit: its life, when it would be done alone, its visit."""
-        return [
-            {
-                "unit": name,
-                "rul": item.median,
-                "interval": list(item.interval),
-                "alone": self.alone[name],
-                "visit": self.visit_of(name),
-                "p_failed_before": 1.0 - item.survives(self.visit_of(name)),
-            }
-            for name, item in self.units.items()
-        ]
+        return [self._row(name, item) for name, item in self.units.items()]
+
+    def _row(self, name: str, item: Prognosis) -> dict[str, Any]:
+        visit = self.visit_of(name)
+        return {
+            "unit": name,
+            "rul": item.rul["median"],
+            "interval": item.rul["interval"],
+            "alone": self.alone.get(name),
+            "visit": visit,
+            "p_failed_before": None if visit is None else 1.0 - item.survives(visit - 1e-9),
+        }
 
     def plot(self) -> Figure:
         """Return the remaining lives and the visits."""
         return fleet_figure(self)
 
-    def visit_of(self, name: str) -> float:
-        """Return when a unit is done."""
-        return next(visit.use for visit in self.visits if name in visit.units)
+    def visit_of(self, name: str) -> float | None:
+        """Return when a unit is done; None where no end of its life is in sight."""
+        return next((visit.use for visit in self.visits if name in visit.units), None)
 
     @property
     def findings(self) -> list[str]:
         """What each unit's prediction must be read with, its name before it."""
-        return [f"{name}: {text}" for name, item in self.units.items() for text in item.findings]
+        out = [
+            f"{name}: no visit is planned: no end of its life is in sight in half of the futures"
+            for name in self.units
+            if self.visit_of(name) is None
+        ]
+        return out + [f"{n}: {text}" for n, item in self.units.items() for text in item.findings]
 
 
 def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
@@ -144,35 +151,38 @@ def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
     kinds = {item.unit for item in units.values()}
     if len(kinds) > 1:
         raise InputError(f"the fleet is counted in several units: {', '.join(sorted(kinds))}")
-    instants = _instants(units.values())
-    table = {name: _expected(item, instants, costs) for name, item in units.items()}
+    ending = {name: item for name, item in units.items() if np.isfinite(item.median)}
+    instants = _instants(ending.values())
+    table = {name: _expected(item, instants, costs) for name, item in ending.items()}
     alone = {name: float(instants[cost.argmin()]) for name, cost in table.items()}
-    order = sorted(units, key=lambda name: alone[name])
+    order = sorted(ending, key=lambda name: alone[name])
     visits, cost = _grouped(order, table, instants, costs.visit)
-    single = sum(float(c.min()) for c in table.values()) + costs.visit * len(units)
+    single = sum(float(c.min()) for c in table.values()) + costs.visit * len(ending)
     return FleetPlan(next(iter(kinds)), units, alone, visits, cost, single)
 
 
 def _instants(units: Iterable[Prognosis]) -> Floats:
     """Return when a visit may be: as finely as each unit's life asks, one that ends soon, too."""
     ends = [max(float(np.quantile(_finite(item), 0.95)), 1.0) for item in units]
-    return np.unique(np.concatenate([np.linspace(0.0, end, _INSTANTS) for end in ends]))
+    return np.unique(np.concatenate([np.linspace(0.0, end, _INSTANTS) for end in [*ends, 1.0]]))
 
 
 def _finite(item: Prognosis) -> Floats:
-    """Remaining lives; those without end in sight count as the longest seen, or as none."""
+    """Return remaining lives; those without end in sight count as the longest that has one."""
     lives = item.future.remaining
     known = lives[np.isfinite(lives)]
-    return np.where(np.isfinite(lives), lives, known.max(initial=1.0))
+    return np.where(np.isfinite(lives), lives, known.max(initial=0.0))
 
 
 def _expected(item: Prognosis, instants: Floats, costs: Costs) -> Floats:
-    """Expected cost of doing a unit at each instant, shape (t,)."""
+    """Expected cost of doing a unit at each instant, shape (t,); one that has failed waits not."""
     lives = np.sort(_finite(item))
     failed = np.searchsorted(lives, instants, side="left") / len(lives)
     left = np.append(np.cumsum(lives[::-1])[::-1], 0.0)[np.searchsorted(lives, instants)]
     lost = left / len(lives) - (1.0 - failed) * instants
-    return np.asarray(costs.early * lost + costs.late * failed)
+    cost = costs.early * lost + costs.late * failed
+    over = item.median <= 0.0
+    return np.asarray(np.where(over & (instants > 0.0), _NEVER, cost))
 
 
 def _grouped(
@@ -200,16 +210,19 @@ def fleet_figure(plan: FleetPlan) -> Figure:
     """Draw each unit's remaining life and the visits."""
     from elevon.report.figures import COLOURS, new_figure
 
-    names = sorted(plan.units, key=plan.visit_of, reverse=True)
+    names = sorted(plan.units, key=lambda name: plan.alone.get(name, np.inf), reverse=True)
+    ends = [v for item in plan.units.values() for v in item.interval if np.isfinite(v)]
+    far = 1.1 * max([*ends, 1.0])
     with new_figure(width=8.5, height=1.2 + 0.42 * len(names)) as (figure, axis):
         for k, name in enumerate(names):
             item = plan.units[name]
-            low, high = np.minimum(item.interval, 1e7)
+            low, high = np.minimum(item.interval, far)
             axis.plot([low, high], [k, k], color=COLOURS["orange"], lw=6, alpha=0.5)
-            axis.plot([item.median], [k], "o", color=COLOURS["orange"])
-            axis.plot([plan.visit_of(name)], [k], "|", color=COLOURS["blue"], ms=16, mew=2.5)
-        for visit in plan.visits:
-            axis.axvline(visit.use, color=COLOURS["blue"], lw=0.8, ls=":")
+            axis.plot([min(item.median, far)], [k], "o", color=COLOURS["orange"])
+            if (visit := plan.visit_of(name)) is not None:
+                axis.plot([visit], [k], "|", color=COLOURS["blue"], ms=16, mew=2.5)
+        for done in plan.visits:
+            axis.axvline(done.use, color=COLOURS["blue"], lw=0.8, ls=":")
         axis.set(xlabel=f"{plan.unit} from now", yticks=range(len(names)), yticklabels=names)
         axis.set_xlim(left=0.0)
     return figure

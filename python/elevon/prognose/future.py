@@ -68,14 +68,14 @@ def look_ahead(
     model_error: float = 0.0,
     course: bool = True,
 ) -> Future:
-    """Let units of equal weight be used until they fail.
+    """Let units be used until they fail.
 
     Parameters
     ----------
     process : Process
         How they grow.
     units : UnitPopulation
-        Now; weights are not used.
+        Now.
     usage : Usage
         Of the future: the factor on the loads is drawn once a unit.
     rng : Generator
@@ -86,7 +86,7 @@ def look_ahead(
         Whether the severities' course is kept, which takes a sixth of the time; else it is where
         they stand now.
     """
-    count = len(units.weight)
+    count = len(units)
     off = _model_errors(process, units, model_error, rng)
     load = usage.load * np.exp(usage.load_spread * rng.standard_normal(count))
     end, first = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
@@ -125,7 +125,7 @@ def _model_errors(
 
     Drawn, or what the units carry where requirements have been measured.
     """
-    count, requirements = len(units.weight), process.response.requirements
+    count, requirements = len(units), process.response.requirements
     measured = [r.measure != SEVERITY for r in requirements]
     if deviation == 0.0:
         return np.zeros((len(measured), count))

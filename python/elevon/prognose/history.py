@@ -39,6 +39,9 @@ MappedLog = tuple[Path, str | Path | None]
 _LONGEST = 2**24
 """Bytes of an inspection's file; it has some ten thousand."""
 
+_MOST = 1e9
+"""Greatest use: a flight a minute, two thousand years."""
+
 _KEYS = frozenset(
     {"usage", "unit", "date", "serial", "reset", "logs", "map", "healthy", "measured"}
 )
@@ -200,8 +203,8 @@ def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
     if not isinstance(data, dict) or "usage" not in data:
         return None
     usage = data["usage"]
-    if isinstance(usage, bool) or not isinstance(usage, (int, float)) or not 0 <= usage < 1e15:
-        raise FormatError(f"{path}: usage = {usage!r} is not a number, 0 or more")
+    if isinstance(usage, bool) or not isinstance(usage, (int, float)) or not 0 <= usage <= _MOST:
+        raise FormatError(f"{path}: usage = {usage!r} is not a number from 0 to {_MOST:g}")
     unit = data.get("unit")
     if unit not in UNITS_OF_USE:
         raise FormatError(f"{path}: unit = {unit!r} is none of {', '.join(UNITS_OF_USE)}")

@@ -92,10 +92,15 @@ class Law:
     dormant : float
         Share of new units in which the fault is not there and does not grow; it may begin to, at
         `start` (`ONSET` of `elevon.prognose.process`).
+    whole : bool
+        Whether the fault comes in whole numbers: tables have those; between them growth is what
+        leads to the next.
     severity, damage : callable
         Damage to severity and back, shape (n,) to (n,), both rising.
     highest : float
         Greatest severity that predictions look at [unit].
+    only : bool
+        Whether the fault grows by this law alone: no other way of growth is tried beside it.
     """
 
     name: str
@@ -114,6 +119,8 @@ class Law:
     start: float = 0.0
     start_spread: float = 0.0
     dormant: float = 0.0
+    only: bool = False
+    whole: bool = False
     severity: Callable[[Floats], Floats] = field(default=_same)
     damage: Callable[[Floats], Floats] = field(default=_same)
 

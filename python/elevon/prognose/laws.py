@@ -8,6 +8,8 @@ scale of a life, the diagnoses of the unit then say its own.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +67,10 @@ def _magnets(damage: Floats, drivers: Drivers, c: Values) -> Floats:
 
 def _bearing(damage: Floats, drivers: Drivers, c: Values) -> Floats:
     return c["wear"] * drivers["shaft_travel"] * (1.0 + c["pull"] * damage)
+
+
+def _relaxing(damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    return c["wear"] * drivers["hours"] * np.maximum(1.0 - damage, 0.0)
 
 
 def _spall(damage: Floats, drivers: Drivers, c: Values) -> Floats:
@@ -195,6 +201,107 @@ LAWS: dict[str, Law] = {
     ),
 }  # fmt: skip
 """Name to law."""
+
+_SPALL = LAWS["spall"]
+_OF_WORK = ("friction_work",)
+
+
+def _by_work(
+    name: str, text: str, source: str, *, fault: tuple[str, str, str], pace: tuple[float, str],
+    highest: float, grain: float, **fields: Any,
+) -> Law:  # fmt: skip
+    """Return a law whose damage grows in proportion to the friction work; `pace` is ASSUMED."""
+    kind, place, unit = fault
+    of_work = "1/J" if unit == "1" else f"{unit}/J"
+    return Law(
+        name, text, source, kind, place, unit, _archard, _OF_WORK,
+        {"wear": Coefficient(pace[0], of_work, f"ASSUMED: {pace[1]}")},
+        highest, grain=grain, dormant=_DORMANT, **fields,
+    )  # fmt: skip
+
+
+def _used_up(damage: Floats, drivers: Drivers, c: Values) -> Floats:
+    """What is left goes in proportion to itself."""
+    return c["wear"] * drivers["friction_work"] * np.maximum(1.0 - damage, 0.0)
+
+
+_WORK = "in proportion to the friction work: ASSUMED, as Archard's wear"
+
+#: Of the ball screw and of the landing gear; the rotary's that fit them serve as well.
+_OTHERS = (
+    *(
+        replace(
+            _SPALL, name=name, kind="spall", place=place, text=text,
+            source=f"{_SPALL.source}; screw: N 6.1",
+        )
+        for name, place, text in (
+            ("nut_spall", "screw.nut", "spall of the nut, from a seed"),
+            ("ball_spall", "screw.ball", "spall of a ball, from a seed"),
+        )
+    ),
+    replace(
+        _by_work(
+            "screw_lubricant", "lubricant of the screw worked out of it", f"N 6.1; {_WORK}",
+            fault=("lubrication_loss", "screw", "1"),
+            pace=(2e-8, "two thirds gone in 50 MJ"), highest=0.95, grain=1e-3,
+        ),
+        rate=_used_up,
+    ),
+    _by_work(
+        "screw_contamination", "wear debris that gathers in the screw's grease", f"N 6.1; {_WORK}",
+        fault=("contamination", "screw", "1"),
+        pace=(5e-10, "2.5 % of the grease in 50 MJ"), highest=0.05, grain=5e-5,
+    ),
+    _by_work(
+        "return_jam", "return channels that clog, one after the other", f"N 4.2; {_WORK}",
+        fault=("return_jam", "screw.return_channel", "1"),
+        pace=(2e-8, "a channel in 50 MJ"), highest=3.0, grain=0.1,
+        whole=True,
+    ),
+    _by_work(
+        "preload_loss", "gap of a nut that has lost its preload by wear", f"N 6.1; {_WORK}",
+        fault=("adapter_gap", "adapter", "m"),
+        pace=(1e-11, "0.5 mm in 50 MJ"), highest=1e-3, grain=1.5e-6,
+    ),
+    _by_work(
+        "leg_screw_friction", "friction of the landing gear's screw as it wears and dries",
+        f"N 6.1 (wear of the screw); {_WORK}",
+        fault=("friction_growth", "screw", "N"),
+        pace=(2e-4, "1 kN in 5 MJ"), highest=2000.0, grain=2.0,
+    ),
+    _by_work(
+        "leg_screw_efficiency", "efficiency that the landing gear's screw loses by wear",
+        f"N 5.3; {_WORK}",
+        fault=("efficiency_loss", "screw", "1"),
+        pace=(2e-8, "a tenth in 5 MJ"), highest=0.3, grain=3e-4,
+    ),
+    _by_work(
+        "leg_motor_bearing", "drag of the motor's bearings", f"T3 Table 1.1; {_WORK}",
+        fault=("bearing_wear", "motor.bearing", "N m"),
+        pace=(2e-8, "0.1 N m in 5 MJ"), highest=0.4, grain=4e-4,
+    ),
+    Law(
+        "lock_spring", "spring of the down-lock that relaxes", "ASSUMED: with the time in use",
+        "lock_spring_weak", "lock", "1", _relaxing, ("hours",),
+        {"wear": Coefficient(2e-5, "1/h", "ASSUMED: a third of the force in 20 000 h")},
+        0.9, grain=1e-3, dormant=_DORMANT,
+    ),
+    Law(
+        "brake_wear", "holding torque that the brake loses", "ASSUMED: with the time in use",
+        "brake_slipping", "brake", "1", _relaxing, ("hours",),
+        {"wear": Coefficient(2e-5, "1/h", "ASSUMED: a third of the torque in 20 000 h")},
+        0.9, grain=1e-3, dormant=_DORMANT,
+    ),
+)  # fmt: skip
+LAWS.update({law.name: law for law in _OTHERS})
+
+
+def laws_of(wiring: str) -> dict[str, Law]:
+    """Return the laws whose fault an actuator of a wiring has, in its unit."""
+    from elevon.faults import catalogue
+
+    there = {(r.kind, place, r.unit) for r in catalogue(wiring) for place in r.places}
+    return {n: law for n, law in LAWS.items() if (law.kind, law.place, law.unit) in there}
 
 
 def find_law(name: str, place: str = "law") -> Law:

@@ -58,7 +58,7 @@ def run_to_failure(process: Process, unit: UnitPopulation, rng: np.random.Genera
     InputError
         It does not fail within ten times its expected life.
     """
-    if len(unit.weight) != 1:
+    if len(unit) != 1:
         raise InputError("a life is that of one unit")
     usage, severity = [unit.usage], [process.severity(unit.damage)[0]]
     before = process.response.reserve(process.severity(unit.damage))

@@ -11,6 +11,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    StrictBool,
     StrictFloat,
     StrictInt,
     StrictStr,
@@ -46,6 +47,9 @@ class FaultGrowth(_Frozen):
         Another place of the same kind of fault.
     spread, form_spread, grain, start, start_spread, dormant, highest : float, optional
         As in `elevon.prognose.law.Law`.
+    only : bool
+        Whether the law is kept alone: other ways of growth are not tried beside it. Of a
+        mission's single law.
     coefficients : mapping of str to quantity
         Other values.
     """
@@ -59,6 +63,7 @@ class FaultGrowth(_Frozen):
     start_spread: StrictFloat | StrictInt | None = None
     dormant: StrictFloat | StrictInt | None = None
     highest: Quantity | None = None
+    only: StrictBool = False
     coefficients: dict[str, Quantity] = Field(default_factory=dict)
 
     def resolved(self, laws: Mapping[str, Law], place: str) -> Law:
@@ -76,7 +81,9 @@ class FaultGrowth(_Frozen):
         }
         if self.highest is not None:
             fields["highest"] = parse_quantity(self.highest, law.unit, f"{place}.highest")
-        return law.with_values(values, place=self.place, source="mission file", **fields)
+        return law.with_values(
+            values, place=self.place, source="mission file", only=self.only, **fields
+        )
 
 
 class Usage(_Frozen):
@@ -149,6 +156,8 @@ class Mission(_Frozen):
             raise ValueError("a mission needs at least one [[requirement]]")
         if not self.growth:
             raise ValueError("a mission needs at least one [[growth]]")
+        if len(self.growth) > 1 and any(item.only for item in self.growth):
+            raise ValueError("only = true keeps a law alone: the mission has several [[growth]]")
         names = [item.name for item in self.requirement]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import erfc, sqrt
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.arrays import Floats
 from elevon.errors import InputError, quoted, unknown
+from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
     from elevon.prognose.law import Law
     from elevon.prognose.measured import Measured
 
 SIGMAS = 1.6449  # of a 90 % interval's half width
-_DETECTED = 3.0  # deviations at which a severity counts as seen
+DETECTED = 3.0  # deviations at which a severity counts as seen
 _AT_EDGE = 0.98
 _LEAST = 0.005  # of the severity: no diagnosis is believed to be better; ASSUMED
-_OUTLIER = 0.02  # share of diagnoses that say nothing true; ASSUMED
-_BELIEF = 2.0  # diagnoses that the stated deviations count for against the scatter seen; ASSUMED
-_LARGEST = 3.0  # deviations beyond which a diagnosis is taken as stray, not as scatter
-_MISSED = 1e-3  # share of diagnoses that do not see a fault that is well there; ASSUMED
 
 
 #: What all diagnoses of a unit's fault err by alike, by kind: deviation relative to the severity,
@@ -58,47 +54,6 @@ class Seen:
     high: float
     common: float = 0.0
 
-    def off(self, severity: Floats) -> Floats:
-        """Return how far severities of shape (n,) are from it, in its deviations."""
-        off = severity - (0.0 if self.severity is None else self.severity)
-        return np.asarray(off / np.where(off < 0.0, self.low, self.high))
-
-    def scatter(self, severity: Floats) -> Floats:
-        """Return the squares of `off`, as scatter counts them: nothing of a fault not seen."""
-        if self.severity is None:
-            return np.zeros(len(severity))
-        return np.asarray(np.minimum(np.abs(self.off(severity)), _LARGEST) ** 2)
-
-    def log_likelihood(
-        self, severity: Floats, misfit: Floats | float = 0.0, count: float = 0.0
-    ) -> Floats:
-        """Return it for severities of shape (n,), up to a constant.
-
-        How widely the diagnoses of a fault truly scatter, over the deviations they state, is not
-        known: with an inverse-gamma square of it the likelihood is Student's, about the misfits so
-        far (Gelman et al., Bayesian Data Analysis, 3.3). A share of diagnoses is stray. A fault
-        that was not seen is one whose diagnosis fell below what could be detected.
-
-        Parameters
-        ----------
-        severity : ndarray, shape (n,)
-            Of the units.
-        misfit : ndarray, shape (n,)
-            Sum of the squares of `off` at earlier inspections.
-        count : float
-            How many those were.
-        """
-        score = self.off(severity)
-        stray = _MISSED if self.severity is None else _OUTLIER
-        if self.severity is None:
-            above = np.array([erfc(x) for x in (_DETECTED - score) / sqrt(2.0)])
-            return np.asarray(np.log(stray + (1.0 - stray) * (1.0 - 0.5 * above)))
-        wide = np.log(stray / 30.0)  # evenly over thirty deviations
-        freedom = _BELIEF + count
-        spread = _BELIEF + np.asarray(misfit)
-        near = -0.5 * np.log(spread / freedom) - 0.5 * (freedom + 1.0) * np.log1p(score**2 / spread)
-        return np.asarray(np.logaddexp(np.log1p(-stray) + near, wide))
-
 
 @dataclass(frozen=True)
 class Inspection:
@@ -117,7 +72,7 @@ class Inspection:
     date : str
         ISO date, or empty.
     measured : mapping of str to Measured
-        Requirements' own values, by name; they update the particle filter alone.
+        Requirements' own values, by name.
     """
 
     usage: float
@@ -159,9 +114,9 @@ def inspection(
         cause = _cause(data, law, name)
         limit = _detectable(data, law, name)
         if cause is not None:
-            read = _read(cause, limit, f"{name}: {law.key}")
+            read = _read(cause, law, limit, f"{name}: {law.key}")
         elif limit is not None:
-            read = Seen(None, limit / _DETECTED, limit / _DETECTED)
+            read = Seen(None, limit / DETECTED, limit / DETECTED)
         else:
             continue
         seen[law.key] = replace(read, common=_common(law.kind, read.severity or 0.0))
@@ -229,22 +184,41 @@ def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
     return limit
 
 
-def _edge(kind: str) -> float:
-    """Return the greatest severity that diagnosis looks at."""
+def _edge(law: Law) -> float:
+    """Return the greatest severity that diagnosis looks at, in the law's unit; none: infinite."""
     from elevon.diagnose.engine.candidates import CANDIDATES
 
-    return max((c.high for c in CANDIDATES if c.kind == kind), default=np.inf)
+    edges = (c.high for c in CANDIDATES if c.kind == law.kind and c.unit == law.unit)
+    return max(edges, default=np.inf)
 
 
-def _read(cause: Mapping[str, Any], limit: float | None, place: str) -> Seen:
-    try:
-        severity = float(cause["severity"])
-        low, high = (float(value) for value in cause["interval"])
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{place}: severity and interval are not numbers") from error
+@lru_cache(maxsize=64)
+def _range(kind: str, place: str, unit: str) -> tuple[float, float]:
+    """Return the severities that a fault can have by the catalogues of all actuators."""
+    from elevon.faults import catalogue
+    from elevon.parameters.records import wiring_names
+
+    records = [
+        item
+        for wiring in wiring_names()
+        for item in catalogue(wiring)
+        if item.kind == kind and place in item.places and item.unit == unit
+    ]
+    if not records:
+        return -np.inf, np.inf
+    return min(item.minimum for item in records), max(item.maximum for item in records)
+
+
+def _read(cause: Mapping[str, Any], law: Law, limit: float | None, place: str) -> Seen:
+    severity, low, high = _numbers(cause, law, place)
     if not (np.isfinite([severity, low, high]).all() and low <= severity <= high):
         raise InputError(f"{place}: severity {severity:g} is not within {low:g} to {high:g}")
-    if high >= _AT_EDGE * _edge(str(cause["kind"])):  # it may be more than is looked at
+    least, most = _range(law.kind, law.place, law.unit)
+    if not least <= severity <= most:
+        raise InputError(
+            f"{place}: severity {severity:g} {law.unit} is outside {least:g} to {most:g}"
+        )
+    if high >= _AT_EDGE * _edge(law):  # it may be more than is looked at
         high = max(high, severity) + 4.0 * abs(severity)
     floor = _LEAST * max(abs(severity), limit or 0.0) or 1e-9
     return Seen(
@@ -252,3 +226,18 @@ def _read(cause: Mapping[str, Any], limit: float | None, place: str) -> Seen:
         max((severity - low) / SIGMAS, floor),
         max((high - severity) / SIGMAS, floor),
     )
+
+
+def _numbers(cause: Mapping[str, Any], law: Law, place: str) -> list[float]:
+    """Return severity and interval in the law's unit: the cause may state another of its kind."""
+    try:
+        given = [float(cause["severity"]), *(float(value) for value in cause["interval"])]
+        severity, low, high = given
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{place}: severity and interval are not numbers") from error
+    unit = cause.get("unit", law.unit)
+    if unit == law.unit or not np.isfinite(given).all():
+        return [severity, low, high]
+    if not isinstance(unit, str):
+        raise InputError(f"{place}: unit = {unit!r} is not a text")
+    return [parse_quantity(f"{value!r} {unit}", law.unit, f"{place}: unit") for value in given]

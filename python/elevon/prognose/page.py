@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +14,7 @@ from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
+    from elevon.prognose.assumptions import Assumed
     from elevon.prognose.law import Law
 
 
@@ -28,6 +29,8 @@ def sentence(result: Prognosis) -> str:
 def _remaining(result: Prognosis) -> str:
     low, high = result.interval
     if not np.isfinite(result.median):
+        if not np.isfinite(low):
+            return f"No end of life is in sight ({result.level:.0%} of the futures and more)."
         return (
             f"No end of life is in sight in more than half of the futures; the shortest "
             f"{0.5 * (1.0 - result.level):.0%} end within {low:.4g} {result.unit}."
@@ -46,6 +49,7 @@ def prognosis_page(
     laws: Sequence[Law],
     *,
     actuator: str,
+    assumed: Sequence[Assumed] = (),
     date: str | None = None,
 ) -> Report:
     """Return the report of a prognosis."""
@@ -67,8 +71,24 @@ def prognosis_page(
     _faults(report, result)
     if result.findings:
         report.section("Findings").points(result.findings)
+    _assumed(report, assumed, result.unit)
     _laws(report, laws)
     return report
+
+
+def _assumed(report: Report, assumed: Sequence[Assumed], unit: str) -> None:
+    if not assumed:
+        return
+    rows = [
+        (
+            a.name,
+            *("no end in sight" if v is None else f"{v:.4g}" for v in (a.median, a.low, a.high)),
+        )
+        for a in assumed
+    ]
+    report.section(
+        "What each assumption costs", "The prediction again, with one thing taken for certain."
+    ).table(ReportTable(("taken for certain", f"{unit} remain", "low", "high"), rows))
 
 
 def _requirements(report: Report, result: Prognosis) -> None:
@@ -105,16 +125,25 @@ def _faults(report: Report, result: Prognosis) -> None:
                 f"{item.kind}@{item.place}",
                 f"{to_display(item.severity, unit):.3g} ({low} to {high}) {unit}",
                 f"{item.factor:.3g} ({slow} to {fast})",
+                ", ".join(f"{n} {p:.0%}" for n, p in _likeliest(item.growth)),
                 item.inspections,
             )
         )
     report.section("Faults now").table(
         ReportTable(
-            ("fault", "severity", "growth over the law's", "inspections that saw it"),
+            ("fault", "severity", "growth over the law's", "grows by", "inspections that saw it"),
             rows,
             f"Median and {result.level:.0%} interval.",
         )
     )
+
+
+def _likeliest(growth: Mapping[str, float]) -> list[tuple[str, float]]:
+    ranked = sorted(growth.items(), key=lambda item: -item[1])
+    return [item for item in ranked if item[1] >= _RARE]
+
+
+_RARE = 0.02  # families less likely are left out
 
 
 def _laws(report: Report, laws: Sequence[Law]) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import groupby, pairwise
+from math import erfc, inf, log, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +13,8 @@ import numpy as np
 from elevon.errors import InputError
 from elevon.prognose.answer import KnownFault, OffLaw, Prognosis, Reserve
 from elevon.prognose.future import MODEL_ERROR, look_ahead
+from elevon.prognose.growth import COUNT, GrowthFilter
 from elevon.prognose.observation import Inspection
-from elevon.prognose.particle import COUNT, ParticleFilter, resampled
 from elevon.prognose.process import Process
 from elevon.prognose.respond import respond
 from elevon.prognose.response import ResponseTables, check_start
@@ -21,11 +22,11 @@ from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.prognose.mission import Mission
+    from elevon.prognose.mission import Mission, Usage
     from elevon.prognose.process import UnitPopulation
 
 LEVEL = 0.9
-_SAMPLES = 2000
+_OUTSIDE = 0.01  # share of futures beyond the tables' loads that is stated
 _LEAST = 3  # inspections that saw a fault before its growth counts as known
 
 
@@ -56,7 +57,7 @@ def predict(
     snapshots : bool
         Correct the tables by runs of the switching model.
     particles : int
-        Of the filter.
+        Possible units that are flown to their ends.
     level : float
         Of the intervals.
     seed : int
@@ -74,12 +75,14 @@ def predict(
     tables = response or respond(actuator, mission, snapshots=snapshots)
     _check_new(tables)
     made = clock.perf_counter()
-    flt = ParticleFilter(Process(tables), count=particles, seed=seed)
+    flt = GrowthFilter(Process(tables), seed=seed)
     check_order(inspections)
     for item in inspections:
         flt.update(item)
     updated = clock.perf_counter()
-    result = prognosis(flt, mission, inspections, level=level, seed=seed, serial=serial)
+    result = prognosis(
+        flt, mission, inspections, level=level, seed=seed, serial=serial, particles=particles
+    )
     done = clock.perf_counter()
     result.seconds.update(  # type: ignore[attr-defined]
         {"tables": tables.seconds, "updates": updated - made, "prediction": done - updated}
@@ -88,20 +91,21 @@ def predict(
 
 
 def prognosis(
-    flt: ParticleFilter,
+    flt: GrowthFilter,
     mission: Mission,
     inspections: Sequence[Inspection],
     *,
     level: float = LEVEL,
     seed: int = 0,
     serial: str = "",
+    particles: int = COUNT,
 ) -> Prognosis:
     """Look ahead from where a filter stands."""
     rng = np.random.default_rng([17, seed])
-    units = resampled(flt.units, _SAMPLES, rng)
+    units = flt.drawn(particles, rng)
     future = look_ahead(flt.process, units, mission.usage, rng, model_error=MODEL_ERROR)
     response = flt.process.response
-    known = _known(flt.process, units, inspections, level)
+    known = _known(flt, units, inspections, level)
     severity = np.array([item.severity for item in known])
     values = response.measured(severity[None, :])[:, 0]
     reserve = tuple(
@@ -125,7 +129,7 @@ def prognosis(
         (),
         serial or None,
     )
-    return _with_findings(result, flt, inspections)
+    return _with_findings(result, flt, inspections, mission.usage)
 
 
 def check_order(inspections: Sequence[Inspection]) -> None:
@@ -160,20 +164,18 @@ def _measured(item: Any, value: float, known: Sequence[KnownFault]) -> float:
 
 
 def _known(
-    process: Process, units: UnitPopulation, inspections: Sequence[Inspection], level: float
+    flt: GrowthFilter, units: UnitPopulation, inspections: Sequence[Inspection], level: float
 ) -> tuple[KnownFault, ...]:
     tail = 0.5 * (1.0 - level)
-    severity = process.severity(units.damage)
+    severity = flt.process.severity(units.damage)
+    factors = flt.process.factors(units)
     out = []
-    for k, law in enumerate(process.laws):
+    for k, law in enumerate(flt.process.laws):
         low, middle, high = np.quantile(severity[:, k], [tail, 0.5, 1.0 - tail])
         grows = units.active[:, k]
-        factors = np.exp(units.growth[grows, k]) if grows.any() else np.zeros(1)
-        slow, median, fast = np.quantile(factors, [tail, 0.5, 1.0 - tail])
+        paces = factors[grows, k] if grows.any() else np.zeros(1)
+        slow, median, fast = np.quantile(paces, [tail, 0.5, 1.0 - tail])
         since = _since_reset(inspections, law.key)
-        count = sum(
-            1 for i in since if (s := i.seen.get(law.key)) is not None and s.severity is not None
-        )
         out.append(
             KnownFault(
                 law.kind,
@@ -184,11 +186,17 @@ def _known(
                 (float(low), float(high)),
                 float(median),
                 (float(slow), float(fast)),
-                count,
+                sum(1 for i in since if _saw(i, law.key)),
                 float(grows.mean()),
+                flt.banks[k].families(),
             )
         )
     return tuple(out)
+
+
+def _saw(item: Inspection, key: str) -> bool:
+    seen = item.seen.get(key)
+    return seen is not None and seen.severity is not None
 
 
 def _since_reset(inspections: Sequence[Inspection], key: str) -> Sequence[Inspection]:
@@ -197,14 +205,15 @@ def _since_reset(inspections: Sequence[Inspection], key: str) -> Sequence[Inspec
 
 
 def _with_findings(
-    result: Prognosis, flt: ParticleFilter, inspections: Sequence[Inspection]
+    result: Prognosis, flt: GrowthFilter, inspections: Sequence[Inspection], usage: Usage
 ) -> Prognosis:
     from dataclasses import replace
 
     process = flt.process
     findings = list(_thin(result, inspections))
-    off_law = tuple(OffLaw(*surprise) for surprise in flt.surprises)
-    findings += [item.text for item in off_law]
+    off_law = tuple(OffLaw(*item) for item in flt.contradictions())
+    findings += [OffLaw(*item).text for item in flt.surprises]
+    findings += _of_one_use(inspections)
     seen = {key for item in inspections for key in item.seen}
     findings += _stray(flt, inspections)
     findings += [
@@ -220,11 +229,11 @@ def _with_findings(
     far = float(np.mean(~np.isfinite(result.future.end)))
     if far > 0.0:
         findings.append(f"no end of life is in sight in {100.0 * far:.3g} % of the futures")
-    findings += _beyond(result, process)
+    findings += _beyond(result, process) + _loads(process.response, usage)
     return replace(result, findings=tuple(findings), off_law=off_law)
 
 
-def _stray(flt: ParticleFilter, inspections: Sequence[Inspection]) -> list[str]:
+def _stray(flt: GrowthFilter, inspections: Sequence[Inspection]) -> list[str]:
     """Say where the last diagnosis is taken as stray and, if it is true, the unit has failed."""
     if not inspections:
         return []
@@ -244,6 +253,19 @@ def _stray(flt: ParticleFilter, inspections: Sequence[Inspection]) -> list[str]:
     ]
 
 
+def _of_one_use(inspections: Sequence[Inspection]) -> list[str]:
+    """Say where inspections were made at the same use: they count as made one after the other."""
+    out = []
+    for usage, items in groupby(inspections, key=lambda item: item.usage):
+        names = [item.name for item in items]
+        if len(names) > 1:
+            out.append(
+                f"{len(names)} inspections at use {usage:g} ({', '.join(names)}): their errors are "
+                "taken as independent"
+            )
+    return out
+
+
 def _thin(result: Prognosis, inspections: Sequence[Inspection]) -> list[str]:
     """Say where the history is too short, and how wide the answer is."""
     most = max((item.inspections for item in result.known), default=0)
@@ -252,13 +274,31 @@ def _thin(result: Prognosis, inspections: Sequence[Inspection]) -> list[str]:
     low, high = result.interval
     if np.isfinite(high):
         wide = f"{low:.4g} to {high:.4g} {result.unit}"
-    else:
+    elif np.isfinite(low):
         wide = f"{low:.4g} {result.unit} to no end in sight"
+    else:
+        wide = "no end in sight"
     renewed = " since its part was made new" if any(item.reset for item in inspections) else ""
     return [
         f"{most} inspection(s) saw a growing fault{renewed}; {_LEAST} are needed before its growth "
         "is known. Until then the answer is as wide as the laws' spread: "
         f"{wide} at {result.level:.0%}"
+    ]
+
+
+def _loads(response: ResponseTables, usage: Usage) -> list[str]:
+    """Say how many futures have loads that the tables do not cover."""
+    if not response.loaded:
+        return []
+    low, high = (float(response.grid.axes[-1][k]) for k in (0, -1))
+    spread = usage.load_spread * sqrt(2.0)
+    tails = [abs(log(edge / usage.load)) / spread if spread else inf for edge in (low, high)]
+    outside = 0.5 * sum(erfc(tail) for tail in tails)
+    if outside < _OUTSIDE:
+        return []
+    return [
+        f"{outside:.0%} of the futures have loads outside {low:g} to {high:g} of the mission's, "
+        "where the tables end; they count as there"
     ]
 
 

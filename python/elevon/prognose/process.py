@@ -2,62 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
+from elevon.prognose.bank import BEND, BEND_SPREAD, GROWTHS
 from elevon.prognose.law import Law
 from elevon.prognose.response import ResponseTables
-
-DRIFT = 0.05
-"""Deviation by which the logarithm of a unit's growth factor wanders while its use grows e-fold.
-
-ASSUMED: no law is right for a whole life; a law's wrong exponent shows as a factor that drifts.
-"""
+from elevon.prognose.shapes import Shapes, members, shapes_of
 
 ONSET = 0.05
 """Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
 
-
-_OF_LAWS = (
-    "damage",
-    "growth",
-    "form",
-    "active",
-    "misfit",
-    "common",
-    "coefficients",
-    "off",
-)  # unit, law
+_LONGEST = 0.3  # of a life: what may happen to a rate in a longer step counts as in that
+_OF_LAWS = ("damage", "growth", "row", "active", "off")  # unit, law
 
 
 @dataclass(frozen=True)
 class UnitPopulation:
-    """Units that may be the true one, n of them, with k laws.
+    """Units that may be the true one, n of them of the same weight, with k laws.
 
     Attributes
     ----------
     damage : ndarray, shape (n, k)
         Of each law.
     growth : ndarray, shape (n, k)
-        Logarithm of the unit's own factor on each law's rate.
-    form : ndarray, shape (n, k)
-        Exponent by which the unit's growth differs from the law's as the fault grows.
-    weight : ndarray, shape (n,)
-        Sum 1.
+        Logarithm of the unit's own factor on each fault's rate.
+    row : ndarray of int, shape (n, k)
+        How each fault grows: row of the law's `Shapes`; 0 is the law as it stands.
     active : ndarray of bool, shape (n, k)
         Whether the fault grows.
-    misfit : ndarray, shape (n, k)
-        Sum of the squared distances, in stated deviations, from the diagnoses that saw the fault.
-    common : ndarray, shape (n, k)
-        What all diagnoses of the fault err by alike, in deviations of it (`Seen.common`).
-    coefficients : ndarray, shape (n, k, c)
-        Logarithms of the unit's factors on the coefficients that differ from unit to unit, in the
-        order of `Law.spreading`; the rest of c is unused.
     off : ndarray, shape (n, k, m)
         The model's error of m requirements, in deviations of it, beside the law that
         moves each most; m = 0 until one of them has been measured.
@@ -67,54 +45,30 @@ class UnitPopulation:
 
     damage: Floats
     growth: Floats
-    form: Floats
-    weight: Floats
+    row: npt.NDArray[np.intp]
     active: npt.NDArray[np.bool_]
-    misfit: Floats
-    common: Floats
-    coefficients: Floats
     off: Floats
     usage: float = 0.0
 
     @classmethod
-    def of(
-        cls, damage: Floats, growth: Floats, *, form: Floats | None = None, usage: float = 0.0
-    ) -> UnitPopulation:
-        """Return growing units of equal weight, shape (n, k), with the laws' coefficients."""
-        zeros = np.zeros_like(growth)
+    def of(cls, damage: Floats, growth: Floats, *, usage: float = 0.0) -> UnitPopulation:
+        """Return growing units, shape (n, k), by the laws as they stand."""
         return cls(
             damage=damage,
             growth=growth,
-            form=zeros if form is None else form,
-            weight=np.full(len(growth), 1.0 / len(growth)),
+            row=np.zeros(growth.shape, dtype=np.intp),
             active=np.ones(growth.shape, dtype=np.bool_),
-            misfit=zeros,
-            common=zeros,
-            coefficients=np.zeros((*growth.shape, 0)),
             off=np.zeros((*growth.shape, 0)),
             usage=usage,
         )
 
-    def without_dormant(self) -> UnitPopulation:
-        """Return the units without the faults that do not grow in them: those are not there."""
-        return replace(self, damage=np.where(self.active, self.damage, 0.0))
+    def __len__(self) -> int:
+        """Return how many units there are."""
+        return len(self.damage)
 
     def picked(self, index: npt.NDArray[np.intp]) -> UnitPopulation:
-        """Return those of an index, all with the same weight."""
-        even = np.full(len(index), 1.0 / max(len(index), 1))
-        return replace(self, weight=even, **{name: getattr(self, name)[index] for name in _OF_LAWS})
-
-    def with_law(self, k: int, index: npt.NDArray[np.intp]) -> UnitPopulation:
-        """Return the units with the numbers of one law from those of an index, shape (n,)."""
-        columns = np.arange(self.damage.shape[1])
-        rows = np.where(columns == k, index[:, None], np.arange(len(index))[:, None])
-        return replace(self, **{name: getattr(self, name)[rows, columns] for name in _OF_LAWS})
-
-    def with_off(self, requirements: int, rng: np.random.Generator) -> UnitPopulation:
-        """Return the units with the model's error, drawn where they carry none yet."""
-        if self.off.shape[2]:
-            return self
-        return replace(self, off=rng.standard_normal((*self.damage.shape, requirements)))
+        """Return those of an index."""
+        return replace(self, **{name: getattr(self, name)[index] for name in _OF_LAWS})
 
 
 class Process:
@@ -124,41 +78,80 @@ class Process:
     ----------
     response : ResponseTables
         What severities do.
-    drift : float
-        See `DRIFT`.
+    wander : bool
+        Whether rates drift and bend as units are used.
+
+    Attributes
+    ----------
+    shapes : tuple of Shapes
+        Of each law.
+    range : ndarray, shape (k,)
+        Damage from new to the end of life that each fault alone brings.
     """
 
-    def __init__(self, response: ResponseTables, *, drift: float = DRIFT) -> None:
+    def __init__(self, response: ResponseTables, *, wander: bool = True) -> None:
         self.response = response
         self.laws: tuple[Law, ...] = response.laws
-        self.drift = drift
-        self._quarter = np.array([0.25 * law.highest for law in self.laws])
+        self.wander = wander
+        self._new = np.array([law.start for law in self.laws])
+        self.shapes: tuple[Shapes, ...] = tuple(
+            shapes_of(law, partial(self._alone, k), self._limit(k))
+            for k, law in enumerate(self.laws)
+        )
+        self.range = np.array([s.span_of_damage for s in self.shapes])
         # Beyond the greatest severity of the tables nothing is known; no state runs away there.
-        self.range = np.array([law.highest_damage - law.start for law in self.laws])
-        """Damage from new to the greatest severity of the tables, shape (k,)."""
-        self._most = np.array([2.0 * law.highest_damage for law in self.laws])
-        self._spreads = _spreads(self.laws)
+        self._most = np.array([s.damage[-1] for s in self.shapes])
+        self._modifiers = [self._modifier(k) for k in range(len(self.laws))]
+        self._lives = [s.life() for s in self.shapes]
+
+    def _limit(self, k: int) -> float:
+        """Return the severity at which a fault alone ends the life; the greatest, where none."""
+        severity = np.tile(self.severity(self._new[None, :])[0], (400, 1))
+        severity[:, k] = np.linspace(severity[0, k], self.laws[k].highest, 401)[1:]
+        failed = self.response.reserve(severity).min(axis=0) < 0.0
+        return float(severity[int(np.argmax(failed)) if failed.any() else -1, k])
+
+    def _alone(self, k: int, damage: Floats, member: int = 0) -> Floats:
+        """Return the growth of one fault by a member of its law, the others as in a new unit."""
+        law = self.laws[k]
+        severity = np.tile(self.severity(self._new[None, :])[0], (len(damage), 1))
+        severity[:, k] = law.severity(damage)
+        drivers = self.response.exposed(severity, np.ones(len(damage)))
+        form, deviations, _ = members(law)[member]
+        factors = {
+            name: np.exp(np.full(len(damage), deviation))
+            for name, deviation in zip(law.spreading, deviations, strict=True)
+        }
+        hastened = (1.0 + severity[:, k] / (0.25 * law.highest)) ** form
+        return np.asarray(law.growth(damage, drivers, factors) * hastened)
+
+    def _modifier(self, k: int) -> Floats:
+        """Return the rows' growth over the law's between the points, shape (n, p - 1)."""
+        shapes = self.shapes[k]
+        middle = 0.5 * (shapes.damage[1:] + shapes.damage[:-1])
+        law = np.maximum(self._alone(k, middle), 1e-300)
+        return shapes.rates() / law
 
     def start(self, count: int, rng: np.random.Generator) -> UnitPopulation:
-        """Draw new units."""
+        """Draw new units, as their laws have them."""
         if count < 10:
-            raise InputError(f"{count} particles: at least 10 are needed")
+            raise InputError(f"{count} samples: at least 10 are needed")
         size = len(self.laws)
-        start = np.array([law.start for law in self.laws])
         spread = np.array([law.start_spread for law in self.laws])
         growth = np.array([law.spread for law in self.laws])
-        form = np.array([law.form_spread for law in self.laws])
+        active = rng.random((count, size)) >= np.array([law.dormant for law in self.laws])
+        damage = np.maximum(self._new + spread * rng.standard_normal((count, size)), 0.0)
+        rows = [
+            rng.choice(len(m), size=count, p=[share for *_, share in m])
+            for m in map(members, self.laws)
+        ]
         return UnitPopulation(
-            damage=np.maximum(start + spread * rng.standard_normal((count, size)), 0.0),
+            damage=np.where(active, damage, 0.0),
             growth=growth * rng.standard_normal((count, size)),
-            form=np.abs(form * rng.standard_normal((count, size))),
-            weight=np.full(count, 1.0 / count),
-            active=rng.random((count, size)) >= np.array([law.dormant for law in self.laws]),
-            misfit=np.zeros((count, size)),
-            common=rng.standard_normal((count, size)),
-            coefficients=self._spreads * rng.standard_normal((count, *self._spreads.shape)),
+            row=np.column_stack(rows).astype(np.intp),
+            active=active,
             off=np.zeros((count, size, 0)),
-        ).without_dormant()
+        )
 
     def severity(self, damage: Floats) -> Floats:
         """Return the severities of damages, shape (n, k) both."""
@@ -178,19 +171,36 @@ class Process:
             Factor on the mission's loads.
         """
         damage = np.minimum(damage, self._most)
-        severity = self.severity(damage)
-        drivers = self.response.exposed(severity, load)
-        columns = [
-            law.growth(damage[:, k], drivers, self._factors(units, k))
-            for k, law in enumerate(self.laws)
-        ]
-        factor = np.exp(units.growth + units.form * np.log1p(severity / self._quarter))
-        return np.asarray(np.column_stack(columns) * factor * units.active)
+        drivers = self.response.exposed(self.severity(damage), load)
+        columns = []
+        for k, law in enumerate(self.laws):
+            modifier = self._modifiers[k][units.row[:, k], self._interval(k, damage[:, k])]
+            columns.append(law.growth(damage[:, k], drivers) * modifier)
+        return np.asarray(np.column_stack(columns) * np.exp(units.growth) * units.active)
 
-    def _factors(self, units: UnitPopulation, k: int) -> dict[str, Floats]:
-        """Return units' factors on one law's coefficients; none where they carry none."""
-        names = self.laws[k].spreading[: units.coefficients.shape[2]]
-        return {name: np.exp(units.coefficients[:, k, c]) for c, name in enumerate(names)}
+    def factors(self, units: UnitPopulation) -> Floats:
+        """Return each unit's growth of each fault now, over what its law says of it, (n, k)."""
+        out = np.exp(units.growth)
+        for k in range(len(self.laws)):
+            out[:, k] *= self._modifiers[k][units.row[:, k], self._interval(k, units.damage[:, k])]
+        return out
+
+    def _interval(self, k: int, damage: Floats) -> npt.NDArray[np.intp]:
+        points = self.shapes[k].damage
+        return np.clip(np.searchsorted(points, damage, side="right") - 1, 0, len(points) - 2)
+
+    def paces(self, severity: Floats) -> Floats:
+        """Return each law's growth in the company of the others' faults, over it alone, (k,)."""
+        damage = np.array([
+            law.damage(severity[k : k + 1])[0] for k, law in enumerate(self.laws)
+        ])  # fmt: skip
+        drivers = self.response.exposed(severity[None, :], np.ones(1))
+        out = []
+        for k, law in enumerate(self.laws):
+            alone = float(self._alone(k, damage[k : k + 1])[0])
+            together = float(law.growth(damage[k : k + 1], drivers)[0])
+            out.append(together / alone if alone > 0.0 else 1.0)
+        return np.array(out)
 
     def advance(
         self,
@@ -205,20 +215,21 @@ class Process:
         Without a random generator growth is the mean one; `rate` is that of the units as they
         stand, where it is known already.
         """
-        ones = np.ones(len(units.weight)) if load is None else load
+        ones = np.ones(len(units)) if load is None else load
         first = steps * (self.rate(units, units.damage, ones) if rate is None else rate)
         mean = steps * self.rate(units, units.damage + 0.5 * first, ones)
-        grown = mean if rng is None else _gamma(mean, self.laws, rng)
-        damage, growth, active = units.damage + grown, units.growth, units.active
-        if rng is not None and units.usage > 0.0:
-            e_folds = float(np.log1p(steps / units.usage))
-            if self.drift > 0.0:
-                wander = self.drift * np.sqrt(e_folds)
-                growth = growth + wander * rng.standard_normal(growth.shape)
-            if not active.all():
-                active = active | (rng.random(active.shape) < 1.0 - np.exp(-ONSET * e_folds))
+        damage, growth, active = units.damage, units.growth, units.active
+        if rng is None:
+            damage = damage + mean
+        else:
+            damage = damage + self._scattered(units, mean, rng)
+            if self.wander:
+                growth = self._wandered(units, steps, rng)
+            if units.usage > 0.0 and not active.all():
+                folds = float(np.log1p(steps / units.usage))
+                active = active | (rng.random(active.shape) < -np.expm1(-ONSET * folds))
                 begun = active & ~units.active & (damage <= 0.0)
-                damage = np.where(begun, [law.start for law in self.laws], damage)
+                damage = np.where(begun, self._new, damage)
         return replace(
             units,
             damage=np.minimum(damage, self._most),
@@ -226,6 +237,29 @@ class Process:
             active=active,
             usage=units.usage + steps,
         )
+
+    def _scattered(self, units: UnitPopulation, mean: Floats, rng: np.random.Generator) -> Floats:
+        """Draw increments of gamma processes: mean D, variance D times the row's grain."""
+        out = mean.copy()
+        for k, shapes in enumerate(self.shapes):
+            grain = shapes.grain[units.row[:, k]]
+            if grain.any():
+                scale = np.maximum(grain, 1e-300)
+                drawn = scale * rng.standard_gamma(np.minimum(mean[:, k] / scale, 1e12))
+                out[:, k] = np.where(grain > 0.0, drawn, mean[:, k])
+        return out
+
+    def _wandered(self, units: UnitPopulation, steps: float, rng: np.random.Generator) -> Floats:
+        """Return growth factors after a step: they drift, and now and then they bend."""
+        growth = units.growth.copy()
+        for k, (shapes, life) in enumerate(zip(self.shapes, self._lives, strict=True)):
+            row = units.row[:, k]
+            lives = np.minimum(np.exp(growth[:, k]) * steps / life[row], _LONGEST)
+            normal = rng.standard_normal((3, len(units)))
+            bend = rng.random(len(units)) < 2.0 * shapes.ahead[row] * lives
+            side = np.where(normal[1] > 0.0, BEND, -BEND) + BEND_SPREAD * normal[2]
+            growth[:, k] += shapes.drift[row] * np.sqrt(lives) * normal[0] + bend * side
+        return np.clip(growth, -GROWTHS, GROWTHS)
 
     def to(
         self,
@@ -243,34 +277,3 @@ class Process:
         for stop in np.linspace(units.usage, usage, steps + 1)[1:]:
             units = self.advance(units, float(stop) - units.usage, rng)
         return replace(units, usage=usage)
-
-    def reset(
-        self, units: UnitPopulation, keys: Sequence[str], rng: np.random.Generator
-    ) -> UnitPopulation:
-        """Return the units with parts made new; what replaces them has a growth of its own."""
-        new = self.start(len(units.weight), rng)
-        made = np.array([law.key in keys for law in self.laws])
-        renewed = {
-            name: np.where(made, getattr(new, name), getattr(units, name))
-            for name in ("damage", "growth", "form", "active")
-        }
-        coefficients = np.where(made[:, None], new.coefficients, units.coefficients)
-        return replace(units, coefficients=coefficients, **renewed)
-
-
-def _spreads(laws: Sequence[Law]) -> Floats:
-    """Return the deviations of the coefficients that differ from unit to unit, shape (k, c)."""
-    out = np.zeros((len(laws), max((len(law.spreading) for law in laws), default=0)))
-    for k, law in enumerate(laws):
-        for c, name in enumerate(law.spreading):
-            out[k, c] = law.coefficients[name].spread
-    return out
-
-
-def _gamma(mean: Floats, laws: Sequence[Law], rng: np.random.Generator) -> Floats:
-    """Draw increments of a gamma process: mean D, variance D times the law's grain."""
-    out = mean.copy()
-    for k, law in enumerate(laws):
-        if law.grain > 0.0:
-            out[:, k] = law.grain * rng.standard_gamma(mean[:, k] / law.grain)
-    return out

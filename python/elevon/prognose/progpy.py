@@ -22,8 +22,7 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> o
     """Return a ``progpy.PrognosticsModel``.
 
     States are ``damage KIND@PLACE``, ``growth KIND@PLACE`` (logarithm of the factor on the law's
-    rate), ``form KIND@PLACE`` and, for coefficients that differ from unit to unit,
-    ``COEFFICIENT KIND@PLACE`` (logarithm of the factor on it); outputs the severities; events the
+    rate) and ``row KIND@PLACE`` (number of its way of growth); outputs the severities; events the
     requirements, whose event states are their reserve (1: untouched, 0: failed).
 
     Parameters
@@ -87,13 +86,13 @@ def progpy_model(process: Process, *, load: float = 1.0, step: float = 1.0) -> o
 
 
 def to_samples(units: UnitPopulation, process: Process) -> object:
-    """Return units of equal weight as ``progpy.uncertain_data.UnweightedSamples`` of states.
+    """Return units as ``progpy.uncertain_data.UnweightedSamples`` of states.
 
     A fault that does not grow gets a growth of -700: the exponential of it is nothing.
     """
     from progpy.uncertain_data import UnweightedSamples
 
-    return UnweightedSamples([_states(units, n, process.laws) for n in range(len(units.weight))])
+    return UnweightedSamples([_states(units, n, process.laws) for n in range(len(units))])
 
 
 def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> UnitPopulation:
@@ -119,7 +118,7 @@ _DORMANT = -600.0
 
 def _names(law: Law) -> tuple[str, ...]:
     """Return the names of a law's states."""
-    return tuple(f"{part} {law.key}" for part in ("damage", "growth", "form", *law.spreading))
+    return tuple(f"{part} {law.key}" for part in ("damage", "growth", "row"))
 
 
 def _units(x: Mapping[str, Any], laws: Sequence[Law]) -> UnitPopulation:
@@ -132,22 +131,21 @@ def _population(
     rows: Sequence[Mapping[str, Any]], laws: Sequence[Law], usage: float = 0.0
 ) -> UnitPopulation:
     """Return units of states; a growth of -700 as it is."""
-    most = max(len(_names(law)) for law in laws)
-    table = np.zeros((len(rows), len(laws), most))
-    for n, row in enumerate(rows):
-        for k, law in enumerate(laws):
-            values = [float(np.asarray(row[name]).item()) for name in _names(law)]
-            table[n, k, : len(values)] = values
-    damage, growth, form = np.moveaxis(table[:, :, :3], 2, 0)
-    units = UnitPopulation.of(damage, growth, form=form, usage=usage)
-    return replace(units, coefficients=table[:, :, 3:])
+    table = np.array(
+        [
+            [[float(np.asarray(row[name]).item()) for name in _names(law)] for law in laws]
+            for row in rows
+        ]
+    )
+    damage, growth, row = np.moveaxis(table, 2, 0)
+    units = UnitPopulation.of(damage, growth, usage=usage)
+    return replace(units, row=row.astype(np.intp))
 
 
 def _states(units: UnitPopulation, n: int, laws: Sequence[Law]) -> dict[str, float]:
     out: dict[str, float] = {}
     for k, law in enumerate(laws):
         growth = units.growth[n, k] if units.active[n, k] else -700.0
-        coefficients = units.coefficients[n, k, : len(law.spreading)]
-        values = (units.damage[n, k], growth, units.form[n, k], *coefficients)
+        values = (units.damage[n, k], growth, units.row[n, k])
         out.update(zip(_names(law), map(float, values), strict=True))
     return out

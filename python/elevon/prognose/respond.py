@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from elevon.errors import InputError
 from elevon.prognose.grid import axis_points
 from elevon.prognose.law import Law
+from elevon.prognose.laws import laws_of
 from elevon.prognose.response import ResponseTables
 from elevon.prognose.snapshots import correction
 from elevon.prognose.tabulate import severity_grid, tabulate
@@ -50,8 +52,26 @@ def respond(
     """
     begin = clock.perf_counter()
     acting = tuple(mission.laws() if laws is None else laws)
+    _check_laws(actuator, acting)
     grid = severity_grid(acting, mission, axis_points(len(acting)))
     made = tabulate(actuator, mission, acting, grid, fidelity=fidelity, progress=progress)
     if snapshots and fidelity != "high":
         made = correction(actuator, mission, made, progress).of(made)
     return replace(made, seconds=clock.perf_counter() - begin)
+
+
+def _check_laws(actuator: Actuator, laws: Sequence[Law]) -> None:
+    """Refuse a law whose fault the actuator has not, or has in another unit; name those it has."""
+    from elevon.faults import catalogue
+
+    records = catalogue(actuator.wiring)
+    there = {f"{r.kind}@{place}": r.unit for r in records for place in r.places}
+    for law in laws:
+        unit = there.get(law.key)
+        if unit == law.unit:
+            continue
+        why = (
+            f"has no {law.key}" if unit is None else f"has its {law.key} in {unit}, not {law.unit}"
+        )
+        fit = ", ".join(laws_of(actuator.wiring))
+        raise InputError(f"law {law.name}: {actuator.name} {why}; laws that fit it: {fit}")

@@ -23,16 +23,23 @@ if TYPE_CHECKING:
     from elevon.scenario import Scenario
 
 _CHUNK = 128  # runs held in memory at once
-_LOADS = (0.5, 1.0, 2.0)  # factors on the mission's loads where the future may differ
+_LOADS = (
+    0.5,
+    1.0,
+    2.0,
+)  # factors on the mission's loads and on its median, where the future may differ
 
 
 def severity_grid(laws: Sequence[Law], mission: Mission, count: int) -> Grid:
     """Return the severities that are run, and loads where the future may differ."""
     steps = np.linspace(0.0, 1.0, count) ** 1.5  # denser where life is spent
-    axes = [law.highest * steps for law in laws]
+    axes = [
+        np.arange(np.floor(law.highest) + 1.0) if law.whole else law.highest * steps for law in laws
+    ]
     usage = mission.usage
     if usage.load_spread > 0.0 or usage.load != 1.0:
-        axes.append(np.array(_LOADS))
+        low, stated, high = _LOADS
+        axes.append(np.array([low * min(usage.load, 1.0), stated, high * max(usage.load, 1.0)]))
     return Grid(tuple(axes))
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from elevon.demo.life.results import LifeDemo
 
 _FRAMES = 100
+_FINER = 20  # samples for each frame
 _SECONDS = 5.0  # one sweep of the mission
 _SWING = 3.0  # drawn degrees a degree of the flap
 _GAP = 26.0  # drawn degrees a degree of backlash
@@ -36,6 +37,8 @@ class Motion:
         Motor angle [turns].
     backlash : float
         Total backlash.
+    error : float
+        Largest tracking error, at each sample of a drive's log and not only at those drawn.
     """
 
     output: Floats
@@ -43,6 +46,7 @@ class Motion:
     command: Floats
     motor: Floats
     backlash: float
+    error: float
 
 
 def motion(demo: LifeDemo, usage: float) -> Motion:
@@ -54,14 +58,17 @@ def motion(demo: LifeDemo, usage: float) -> Motion:
     unit: Actuator = demo.hidden
     scenario = demo_mission().scenarios().replaced(duration=2.0 * _SECONDS)
     scenario = scenario.with_faults(faults_at(demo.life, usage))
-    record = f"output_position,motor_position,command@{_FRAMES / _SECONDS:g} Hz"
+    record = f"output_position,motor_position,command@{_FINER * _FRAMES / _SECONDS:g} Hz"
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ElevonWarning)
         run = simulate(unit, scenario, fidelity="low", record=record)
-    output, motor, command = (
-        np.asarray(run[name].values[_FRAMES : 2 * _FRAMES + 1])
+    sweep = slice(_FINER * _FRAMES, 2 * _FINER * _FRAMES + 1)
+    every = [
+        np.asarray(run[name].values[sweep])
         for name in ("output_position", "motor_position", "command")
-    )
+    ]
+    largest = float(np.abs(every[2] - every[0]).max())
+    output, motor, command = (values[::_FINER] for values in every)
     ratio = unit.parameters.value("gear.ratio")
     backlash = unit.parameters.value("backlash.total") + float(demo.life.at(usage)[0])
     return Motion(
@@ -70,6 +77,7 @@ def motion(demo: LifeDemo, usage: float) -> Motion:
         np.degrees(command),
         motor / (2.0 * math.pi),
         math.degrees(backlash),
+        math.degrees(largest),
     )
 
 
@@ -188,13 +196,12 @@ def _errors(moved: Motion, top: float) -> str:
         f'values="{values}"/>'
         for name, values in zip(("cx", "cy"), dots, strict=True)
     )
-    largest = float(np.abs(error).max())
     return (
         f'<path d="M{left} {base} H{right}" stroke="currentColor" stroke-opacity="0.35"/>'
         f'<polyline points="{line}" fill="none" stroke="#d1483c" stroke-width="2"/>'
         f'<circle r="5" fill="#d1483c">{moving}</circle>'
         f'<text x="{left}" y="254" font-size="13" fill="currentColor">tracking error, largest '
-        f"{largest:.2f} deg</text>"
+        f"{moved.error:.3g} deg</text>"
         f'<text x="{right}" y="385" font-size="12" text-anchor="end" fill="currentColor">one '
         f"sweep, {_SECONDS:g} s</text>"
     )

@@ -11,6 +11,7 @@ from elevon.demo.life.figures import (
     signals_figure,
 )
 from elevon.demo.life.mechanism import mechanism, motion
+from elevon.demo.life.unit import FACTORS
 from elevon.logs.read import read_drive_logs
 from elevon.prognose.figures import severity_unit
 from elevon.report import Report, ReportTable
@@ -143,9 +144,11 @@ def _diagnoses(report: Report, demo: LifeDemo) -> None:
 def _prediction(report: Report, demo: LifeDemo) -> None:
     section = report.section(
         "What is left",
-        "Two thousand units that may be this one are carried along: each has its own severities "
-        "and its own growth, and each inspection weighs them. They then fly on until the model "
-        "says that one of the requirements fails.",
+        "Ways of growth, the law's and those of no physics, are compared by each inspection. Two "
+        "thousand units that may be this one then fly on until the model "
+        "says that one of the requirements fails. The unit wears by a law that the prediction has "
+        "not: its wear and friction feed back on themselves, scatter half as much again, and go "
+        f"{FACTORS[0]:g} and {FACTORS[1]:g} times as fast as the law says.",
     )
     section.figure(remaining_figure(demo), "Remaining flights, predicted and true.")
     rows = [
@@ -175,8 +178,8 @@ def _prediction(report: Report, demo: LifeDemo) -> None:
     )
     section.text("The same from the command line, with the files of this folder:")
     section.code(
-        "elevon predict out/demo/history --actuator out/demo/calibrated.toml "
-        "--mission out/demo/mission.toml"
+        f"elevon predict {demo.folder}/history --actuator {demo.folder}/calibrated.toml "
+        f"--mission {demo.folder}/mission.toml"
     )
 
 

@@ -30,7 +30,7 @@ from elevon.demo.steps import Work
 from elevon.errors import Interrupted, OutputExistsError
 from elevon.logs.log import Log
 from elevon.plain import plain, read_plain
-from elevon.prognose import ParticleFilter, Process, Prognosis, respond
+from elevon.prognose import GrowthFilter, Process, Prognosis, respond
 from elevon.prognose.life import Life
 from elevon.progress import Progress, part
 
@@ -197,7 +197,7 @@ def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
 
     rng = np.random.default_rng([demo.seed, 11])
     baselines = read_drive_logs(demo.healthy, one_rate=False)
-    flt = ParticleFilter(Process(demo.response), seed=demo.seed)
+    flt = GrowthFilter(Process(demo.response), seed=demo.seed)
     usage, number = 0.0, 0
     while True:
         number += 1

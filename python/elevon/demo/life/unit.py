@@ -21,7 +21,7 @@ from elevon.progress import Progress
 
 INSPECTED = 330.0
 """Flights between inspections, about."""
-_FACTORS = (1.35, 0.7)
+FACTORS = (1.35, 0.7)
 """Of wear and friction on the laws the prediction starts from: this unit wears faster."""
 _GRAIN = 1.5  # of the truth's scatter over the law's
 _FEEDBACK = 0.5  # greatest relative rise of a truth's growth up to the greatest severity, linear
@@ -68,14 +68,12 @@ def live(unit: Actuator, seed: int, progress: Progress | None = None) -> Life:
     rng = np.random.default_rng([seed, 9])
     laws = [other_law(law, rng) for law in mission.laws()]
     process = Process(
-        respond(unit, mission, laws=laws, snapshots=True, progress=progress), drift=0.0
+        respond(unit, mission, laws=laws, snapshots=True, progress=progress), wander=False
     )
     new = process.start(10, rng).picked(np.array([0]))
-    growth = np.log(np.array([_FACTORS])) + 0.05 * rng.standard_normal((1, 2))
+    growth = np.log(np.array([FACTORS])) + 0.05 * rng.standard_normal((1, 2))
     every = np.ones((1, 2), dtype=np.bool_)
-    return run_to_failure(
-        process, replace(new, growth=growth, form=np.zeros((1, 2)), active=every), rng
-    )
+    return run_to_failure(process, replace(new, growth=growth, row=0 * new.row, active=every), rng)
 
 
 def other_law(law: Law, rng: np.random.Generator) -> Law:

@@ -1,0 +1,249 @@
+"""Ways in which one fault may grow: its law's own, and those of no physics, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.prognose.law import Law
+
+NO_LAW = "no law"
+"""Name of growth at an even rate that wanders, a Wiener or gamma process: of whatever it is."""
+
+_BELOW, _WITHIN, _BEYOND = 16, 120, 40  # points of the tables: below the start, in life, beyond it
+_SLOWEST = 1e-4  # of the mean rate of a life: no table stands still
+_FORMS = (0.0, 0.5, 1.0, 1.7, 2.6)  # of the law's own deviation `form_spread`, one-sided
+_COEFFICIENTS = (0.0, -1.2247, 1.2247)  # deviations of a coefficient, of Gauss and Hermite
+_WEIGHTS = (2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0)
+
+#: Prior share of each family, and its members: relative use of a life at relative damage, from a
+#: seed of a share of the span.
+#: ASSUMED: the law that a mission names is right more often than not; forms of either direction
+#: are as likely.
+_Form = Callable[[Floats, float], Floats]
+
+
+def _power(b: float) -> _Form:
+    return lambda s, _seed: np.asarray(s ** (1.0 / b))
+
+
+def _exponential(a: float) -> _Form:
+    """Return the use of s = (e^(au) - 1)/(e^a - 1); a below 0 is growth that saturates."""
+    return lambda s, _seed: np.asarray(np.log1p(np.maximum(s * np.expm1(a), 1e-9 - 1.0)) / a)
+
+
+def _paris(half: float) -> _Form:
+    """Return the use of growth in proportion to length^half, from a seed [of the span]."""
+    q = 1.0 - half
+    return lambda s, seed: np.asarray((seed**q - (s + seed) ** q) / (seed**q - (1.0 + seed) ** q))
+
+
+_SEED = 0.15  # of the span, where a new unit has no damage
+_FAMILIES: Mapping[str, tuple[float, tuple[_Form, ...]]] = {
+    "linear": (0.035, (lambda s, _seed: s,)),
+    "power": (0.05, tuple(_power(b) for b in (0.5, 0.6, 0.75, 1.4, 1.8, 2.4))),
+    "exponential": (0.05, tuple(_exponential(a) for a in (-2.0, -1.2, 1.5, 2.5, 4.0))),
+    "paris": (0.04, tuple(_paris(m) for m in (1.25, 1.5, 1.75, 2.0))),
+    NO_LAW: (0.025, (lambda s, _seed: s,)),
+}
+_OWN_BENDS, _BENDS = 0.03, 0.5
+"""Changes of the rate in one life, each way: of growth by the law, and of any other. ASSUMED."""
+_OWN_AHEAD, _AHEAD = 0.005, 0.5
+"""The same in a life to come."""
+_STEADY, _FREE, _ROUGH = 0.06, 0.2, 0.5
+"""Drift of the logarithm of the rate over one life: of the law, of growth without a law, and of
+rows whose rate wanders. ASSUMED."""
+_ROUGH_PATH = 0.01
+"""Variance of a wandering row's path over a life, of the square of its damage: a tenth. ASSUMED."""
+_ROUGH_SHARE = 0.04
+"""Prior share of each row that wanders."""
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Rows of growth of one fault; n rows, p points.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Family of each row: the law's name, or one of no physics.
+    prior : ndarray, shape (n,)
+        Sum 1.
+    damage, level : ndarray, shape (p,)
+        Points, in damage and in *level*: the severity, continued below the least that a fault can
+        have, so that growth before a fault shows is a number, too.
+    clock : ndarray, shape (n, p)
+        Use from the first point on, rising, at the growth factor 1.
+    drift, grain : ndarray, shape (n,)
+        Deviation of the logarithm of the rate over a life; scale of the gamma process [damage].
+    start, limit : float
+        Levels of a new unit and of the end of life that this fault alone brings.
+    spread : ndarray, shape (n,)
+        Deviation of the logarithm of the growth factor from unit to unit.
+    bends : ndarray, shape (n,)
+        Changes of the rate in one life so far, each way.
+    ahead : ndarray, shape (n,)
+        The same in the life to come.
+    """
+
+    names: tuple[str, ...]
+    prior: Floats
+    damage: Floats
+    level: Floats
+    clock: Floats
+    drift: Floats
+    grain: Floats
+    start: float
+    limit: float
+    spread: Floats
+    bends: Floats
+    ahead: Floats
+
+    @property
+    def span(self) -> float:
+        """Level from new to the end of life."""
+        return self.limit - self.start
+
+    @property
+    def span_of_damage(self) -> float:
+        """Damage from new to the end of life."""
+        first, last = np.interp((self.start, self.limit), self.level, self.damage)
+        return float(last - first)
+
+    def life(self) -> Floats:
+        """Return the use from new to the end of life of each row, shape (n,)."""
+        at = [np.interp((self.start, self.limit), self.level, row) for row in self.clock]
+        return np.array([end - begin for begin, end in at])
+
+    def rates(self) -> Floats:
+        """Return the growth of damage in one repetition between the points, shape (n, p - 1)."""
+        return np.asarray(np.diff(self.damage) / np.diff(self.clock, axis=1))
+
+
+def shapes_of(law: Law, rate: Callable[[Floats, int], Floats], limit: float) -> Shapes:
+    """Return the ways in which a law's fault may grow.
+
+    Parameters
+    ----------
+    law : Law
+        The first candidate.
+    rate : callable
+        Damages, shape (p,), and the number of a member of `members` to the law's growth a
+        repetition, shape (p,).
+    limit : float
+        Severity at which this fault alone ends the life.
+    """
+    damage, level, start = _points(law, limit)
+    own, own_prior = _own(law, damage, rate)
+    life = np.diff(np.interp((start, limit), level, own[0]))[0]
+    names, prior, clocks = [law.name] * len(own), list(own_prior), list(own)
+    if not law.only:
+        relative = np.maximum((level - start) / (limit - start), 0.0)
+        below = level < start
+        seed = start / (limit - start) if start > 0.0 else _SEED
+        first = float(np.interp(start, level, own[0]))
+        prior = [p * (1.0 - sum(share for share, _ in _FAMILIES.values())) for p in prior]
+        for name, (share, forms) in _FAMILIES.items():
+            for form in forms:
+                use = first + life * form(relative, seed)
+                clocks.append(_rising(np.where(below, own[0], use), life, relative))
+                names.append(name)
+                prior.append(share / len(forms))
+    return _with_roughness(
+        law, names, np.array(prior), np.array(clocks), (damage, level), (start, limit)
+    )
+
+
+def members(law: Law) -> list[tuple[float, tuple[float, ...], float]]:
+    """Return form, deviations of the coefficients and prior of each member of a law's family.
+
+    The first is the law as it stands.
+    """
+    forms = [c * law.form_spread for c in _FORMS] if law.form_spread > 0.0 else [0.0]
+    of_form = np.exp(-0.5 * np.array(_FORMS[: len(forms)]) ** 2)
+    of_form[0] *= 0.5  # half of the others' interval
+    out = []
+    for form, share in zip(forms, of_form / of_form.sum(), strict=True):
+        for picks in product(range(3), repeat=len(law.spreading)):
+            weight = float(np.prod([_WEIGHTS[i] for i in picks]))
+            factors = tuple(
+                _COEFFICIENTS[i] * law.coefficients[name].spread
+                for i, name in zip(picks, law.spreading, strict=True)
+            )
+            out.append((form, factors, float(share) * weight))
+    return out
+
+
+def _own(
+    law: Law, damage: Floats, rate: Callable[[Floats, int], Floats]
+) -> tuple[list[Floats], list[float]]:
+    """Return the clocks of a law's own members, and their prior."""
+    clocks, prior = [], []
+    middle = 0.5 * (damage[1:] + damage[:-1])
+    for k, (_, _, share) in enumerate(members(law)):
+        pace = rate(middle, k)
+        pace = np.maximum(pace, _SLOWEST * max(float(pace.mean()), 1e-300))
+        clocks.append(np.concatenate(([0.0], np.cumsum(np.diff(damage) / pace))))
+        prior.append(share)
+    return clocks, prior
+
+
+def _points(law: Law, limit: float) -> tuple[Floats, Floats, float]:
+    """Return damages, levels, and the level of a new unit."""
+    end, first = float(law.damage(np.array([limit]))[0]), law.start
+    most = 2.0 * law.highest_damage
+    below = np.linspace(0.0, first, _BELOW, endpoint=False) if first > 0.0 else np.zeros(0)
+    within = first + (end - first) * np.linspace(0.0, 1.0, _WITHIN) ** 2
+    beyond = np.geomspace(end, max(most, 2.0 * end), _BEYOND + 1)[1:]
+    damage = np.unique(np.concatenate((below, within, beyond)))
+    level = np.array(law.severity(damage))
+    shown = int(np.argmax(level > 0.0))
+    if shown > 1:  # nothing shows yet: on as at the first point that does
+        slope = (level[shown + 1] - level[shown]) / (damage[shown + 1] - damage[shown])
+        level[:shown] = level[shown] - slope * (damage[shown] - damage[:shown])
+    rising = np.concatenate(([True], np.diff(level) > 0.0))
+    damage, level = damage[rising], level[rising]
+    return damage, level, float(np.interp(first, damage, level))
+
+
+def _rising(clock: Floats, life: float, relative: Floats) -> Floats:
+    """Return a clock that rises at each point: what saturates goes on slowly."""
+    least = 1e-3 * life * np.diff(relative)
+    most = life / _SLOWEST * np.maximum(np.diff(relative), 1e-9)
+    steps = np.diff(np.nan_to_num(clock, posinf=1e300))
+    floor = np.where(np.diff(relative) > 0.0, least, 1e-9 * life)
+    return np.concatenate(([0.0], np.cumsum(np.clip(steps, floor, np.maximum(most, floor)))))
+
+
+def _with_roughness(  # noqa: PLR0917 - parts of one table
+    law: Law, names: list[str], prior: Floats, clocks: Floats, points: tuple[Floats, Floats],
+    ends: tuple[float, float],
+) -> Shapes:  # fmt: skip
+    """Return each row twice: steady, and with a rate and a path that wander."""
+    (damage, level), (start, limit) = points, ends
+    end = float(np.interp(limit, level, damage)) - law.start
+    own = np.array([name == law.name for name in names])
+    free = np.array([name == NO_LAW for name in names])
+    rough = np.where(free, 1.0, _ROUGH_SHARE)
+    grains = [
+        np.where(own, law.grain, max(law.grain, 0.001 * end)),
+        np.full(len(own), _ROUGH_PATH * end),
+    ]
+    return Shapes(
+        tuple(names * 2),
+        np.concatenate((prior * (1.0 - rough), prior * rough)),
+        damage,
+        level,
+        np.vstack((clocks, clocks)),
+        np.concatenate((np.where(own, _STEADY, _FREE), np.full(len(own), _ROUGH))),
+        np.concatenate((grains[0], np.maximum(grains[1], law.grain))),
+        start,
+        limit,
+        np.tile(np.where(own, law.spread, np.maximum(law.spread, 1.0)), 2),
+        np.concatenate((np.where(own, _OWN_BENDS, _BENDS), np.full(len(own), _BENDS))),
+        np.concatenate((np.where(own, _OWN_AHEAD, _AHEAD), np.full(len(own), _AHEAD))),
+    )
