@@ -20,7 +20,7 @@ from elevon.progress import Progress
 from elevon.worklog import finished
 from studies.foreign.judge import Judged, Predict, judged_life
 from studies.foreign.result import ForeignResult
-from studies.foreign.truth import FORMS, OWN, Case, ForeignLife, case, foreign_life, inspected
+from studies.foreign.truth import FORMS, NAMED_LAW, Case, ForeignLife, case, foreign_life, inspected
 from studies.foreign.virkler import EXPONENTS, crack, crack_case, crack_inspections, cracks
 from studies.prognosis.truth import FAULTS
 from studies.side_by_side import side_by_side
@@ -86,7 +86,7 @@ def _works(lives: int, specimens: int, seed: int) -> dict[str, partial[list[dict
         for n in chosen.tolist():
             out[f"crack {n}, {exponent:g}"] = partial(_crack, n, exponent, seed)
     # All forms once, then all again: work that is stopped has seen each of them.
-    for n, form, law, density in product(range(lives), (OWN, *FORMS), FAULTS, _DENSITIES):
+    for n, form, law, density in product(range(lives), (NAMED_LAW, *FORMS), FAULTS, _DENSITIES):
         out[f"{form}, {law} {n}, {density:g}"] = partial(_foreign, law, form, n, density, seed)
     return out
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from elevon.report.checks import Check, verdict
 from studies.foreign.judge import OURS, Judged, judge, paired_gap
-from studies.foreign.truth import FORMS, OWN
+from studies.foreign.truth import FORMS, NAMED_LAW
 
 _COVERAGE = (0.85, 0.95)
 _ACCURACY, _WIDTH, _OFF_LAW = 0.62, 1.8, 0.05
@@ -44,7 +44,7 @@ class ForeignResult:
         """Return figures of each method by density and form, and over all foreign forms."""
         out = []
         for density in sorted({r.density for r in self.judged}):
-            for form in [OWN, *FORMS, _CRACKS, "all foreign"]:
+            for form in [NAMED_LAW, *FORMS, _CRACKS, "all foreign"]:
                 for law in self._laws(form):
                     for method in dict.fromkeys(r.method for r in self.judged):
                         rows = self.rows(method, _of(form, density, law))
@@ -59,8 +59,8 @@ class ForeignResult:
         if form == _CRACKS:
             return sorted({r.law for r in self.judged if r.form == form})
         return (
-            ["", *dict.fromkeys(r.law for r in self.judged if r.form == OWN)]
-            if form == OWN
+            ["", *dict.fromkeys(r.law for r in self.judged if r.form == NAMED_LAW)]
+            if form == NAMED_LAW
             else [""]
         )
 
@@ -84,7 +84,7 @@ class ForeignResult:
         for density in sorted({r.density for r in self.judged if r.form != _CRACKS}):
             ours = judge(self.rows(OURS, _of("all foreign", density)))
             wiener = judge(self.rows(_WIENER, _of("all foreign", density)))
-            own = self.rows(OURS, _of(OWN, density))
+            named = self.rows(OURS, _of(NAMED_LAW, density))
             name = f"{density:g} times the inspections"
             out += [
                 Check(f"coverage, at least, {name}", ours["coverage"], _COVERAGE[0], at_least=True),
@@ -93,7 +93,7 @@ class ForeignResult:
                       ours["width"] / wiener["width"], _WIDTH),
                 Check(f"accuracy, {name}", ours["accuracy"], _ACCURACY, at_least=True),
                 Check(f"own laws said to be off, {name}",
-                      float(np.mean([r.status == "off_law" for r in own])), _OFF_LAW),
+                      float(np.mean([r.status == "off_law" for r in named])), _OFF_LAW),
             ]  # fmt: skip
         out += [
             Check(f"accuracy over {g['best']}, {g['form']}: upper end of 90 %", g["interval"][1],

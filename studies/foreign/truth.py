@@ -17,7 +17,7 @@ from studies.prognosis.campaign import campaign_mission
 from studies.prognosis.truth import FAULTS, seen_as
 
 Rng = np.random.Generator
-OWN = "own law"
+NAMED_LAW = "own law"
 _POINTS = 2001
 _MOST = 20_000  # steps of a life by the law, of some hundreds
 _LIFE = 0.5  # deviation of the logarithm of a life over the one that the law expects
@@ -169,11 +169,11 @@ FORMS: dict[str, Callable[[Floats, Rng], Floats]] = {
 
 def foreign_life(law: str, form: str, number: int, seed: int) -> ForeignLife:
     """Draw one life; the same whatever else is drawn."""
-    name = [OWN, *FORMS].index(form)
+    name = [NAMED_LAW, *FORMS].index(form)
     rng = np.random.default_rng([31, seed, name, FAULTS.index(law), number])
     given = case(law)
-    if form == OWN:
-        return _own(given, number, rng)
+    if form == NAMED_LAW:
+        return _named_law(given, number, rng)
     # Some forms reach the limit late: the course is drawn twice as long and cut where it ends.
     share = np.linspace(0.0, 1.0, _POINTS)
     course = FORMS[form](share, rng)
@@ -187,7 +187,7 @@ def foreign_life(law: str, form: str, number: int, seed: int) -> ForeignLife:
     return ForeignLife(law, form, number, usage, severity, float(usage[-1]))
 
 
-def _own(given: Case, number: int, rng: Rng) -> ForeignLife:
+def _named_law(given: Case, number: int, rng: Rng) -> ForeignLife:
     """Draw a life of the law that the filter is given: a unit of its own population.
 
     Its factor, form and coefficients are drawn as the law states them; it grows by the law and a
@@ -196,7 +196,7 @@ def _own(given: Case, number: int, rng: Rng) -> ForeignLife:
     law, tables = given.tables.laws[0], given.tables
     factor = float(np.exp(law.spread * rng.standard_normal()))
     form = abs(law.form_spread * rng.standard_normal())
-    own = {n: np.exp(law.coefficients[n].spread * rng.standard_normal(1)) for n in law.spreading}
+    drawn = {n: np.exp(law.coefficients[n].spread * rng.standard_normal(1)) for n in law.spreading}
     damage = np.array([max(law.start + law.start_spread * rng.standard_normal(), 0.0)])
     last, step = float(law.damage(np.array([given.limit]))[0]), 2e-3 * given.expected / factor
     usage, severities, one = [0.0], [float(law.severity(damage)[0])], np.ones(1)
@@ -204,12 +204,14 @@ def _own(given: Case, number: int, rng: Rng) -> ForeignLife:
         severity = law.severity(damage)
         drivers = tables.exposed(severity[:, None], one)
         pace = factor * (1.0 + severity / (0.25 * law.highest)) ** form
-        mean = step * pace * law.growth(damage, drivers, own)
+        mean = step * pace * law.growth(damage, drivers, drawn)
         grown = law.grain * rng.standard_gamma(mean / law.grain) if law.grain else mean
         damage = damage + grown
         usage.append(usage[-1] + step)
         severities.append(float(law.severity(damage)[0]))
-    return ForeignLife(given.law, OWN, number, np.array(usage), np.array(severities), usage[-1])
+    return ForeignLife(
+        given.law, NAMED_LAW, number, np.array(usage), np.array(severities), usage[-1]
+    )
 
 
 def inspected(life: ForeignLife, density: float, seed: int) -> list[Inspection]:

@@ -74,8 +74,8 @@ def assumptions(
             flt.update(item)
         rng = np.random.default_rng([25, seed])
         units = flt.drawn(_SAMPLES, rng)
-        told = look_ahead(flt.process, units, future, rng, model_error=error, course=False)
-        out.append(_assumed(name, told.remaining, level))
+        outlook = look_ahead(flt.process, units, future, rng, model_error=error, course=False)
+        out.append(_assumed(name, outlook.remaining, level))
     return tuple(out)
 
 

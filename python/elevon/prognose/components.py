@@ -36,8 +36,8 @@ def _neighbourhoods(spread: float) -> tuple[Floats, Floats, float]:
     if spread <= _WIDTH:
         return np.zeros(1), np.ones(1), spread
     width = 0.7 * _WIDTH
-    rest = sqrt(spread**2 - width**2)
-    count = 2 * int(np.ceil(2.5 * rest / _WIDTH)) + 1
+    remainder = sqrt(spread**2 - width**2)
+    count = 2 * int(np.ceil(2.5 * remainder / _WIDTH)) + 1
     at = np.asarray(_WIDTH * (np.arange(count) - count // 2), dtype=np.float64)
-    weight = np.exp(-0.5 * (at / rest) ** 2)
+    weight = np.exp(-0.5 * (at / remainder) ** 2)
     return at, np.asarray(weight / weight.sum()), float(width)

@@ -138,19 +138,19 @@ def shapes_of(law: Law, rate: Callable[[Floats, int], Floats], limit: float) -> 
         Severity at which this fault alone ends the life.
     """
     damage, level, start = _points(law, limit)
-    own, own_prior = _own(law, damage, rate)
-    life = np.diff(np.interp((start, limit), level, own[0]))[0]
-    names, prior, clocks = [law.name] * len(own), list(own_prior), list(own)
+    member_clocks, members_prior = _members(law, damage, rate)
+    life = np.diff(np.interp((start, limit), level, member_clocks[0]))[0]
+    names, prior, clocks = [law.name] * len(member_clocks), list(members_prior), list(member_clocks)
     if not law.only:
         relative = np.maximum((level - start) / (limit - start), 0.0)
         below = level < start
         seed = start / (limit - start) if start > 0.0 else _SEED
-        first = float(np.interp(start, level, own[0]))
+        first = float(np.interp(start, level, member_clocks[0]))
         prior = [p * (1.0 - sum(share for share, _ in _FAMILIES.values())) for p in prior]
         for name, (share, forms) in _FAMILIES.items():
             for form in forms:
                 use = first + life * form(relative, seed)
-                clocks.append(_rising(np.where(below, own[0], use), life, relative))
+                clocks.append(_rising(np.where(below, member_clocks[0], use), life, relative))
                 names.append(name)
                 prior.append(share / len(forms))
     return _with_roughness(
@@ -178,7 +178,7 @@ def members(law: Law) -> list[tuple[float, tuple[float, ...], float]]:
     return out
 
 
-def _own(
+def _members(
     law: Law, damage: Floats, rate: Callable[[Floats, int], Floats]
 ) -> tuple[list[Floats], list[float]]:
     """Return the clocks of a law's own members, and their prior."""
@@ -201,10 +201,10 @@ def _points(law: Law, limit: float) -> tuple[Floats, Floats, float]:
     beyond = np.geomspace(end, max(most, 2.0 * end), _BEYOND + 1)[1:]
     damage = np.unique(np.concatenate((below, within, beyond)))
     level = np.array(law.severity(damage))
-    shown = int(np.argmax(level > 0.0))
-    if shown > 1:  # nothing shows yet: on as at the first point that does
-        slope = (level[shown + 1] - level[shown]) / (damage[shown + 1] - damage[shown])
-        level[:shown] = level[shown] - slope * (damage[shown] - damage[:shown])
+    visible = int(np.argmax(level > 0.0))
+    if visible > 1:  # nothing shows yet: on as at the first point that does
+        slope = (level[visible + 1] - level[visible]) / (damage[visible + 1] - damage[visible])
+        level[:visible] = level[visible] - slope * (damage[visible] - damage[:visible])
     rising = np.concatenate(([True], np.diff(level) > 0.0))
     damage, level = damage[rising], level[rising]
     return damage, level, float(np.interp(first, damage, level))
@@ -226,12 +226,12 @@ def _with_roughness(  # noqa: PLR0917 - parts of one table
     """Return each row twice: steady, and with a rate and a path that wander."""
     (damage, level), (start, limit) = points, ends
     end = float(np.interp(limit, level, damage)) - law.start
-    own = np.array([name == law.name for name in names])
+    named = np.array([name == law.name for name in names])
     free = np.array([name == NO_LAW for name in names])
     rough = np.where(free, 1.0, _ROUGH_SHARE)
     grains = [
-        np.where(own, law.grain, max(law.grain, 0.001 * end)),
-        np.full(len(own), _ROUGH_PATH * end),
+        np.where(named, law.grain, max(law.grain, 0.001 * end)),
+        np.full(len(named), _ROUGH_PATH * end),
     ]
     return Shapes(
         tuple(names * 2),
@@ -239,11 +239,11 @@ def _with_roughness(  # noqa: PLR0917 - parts of one table
         damage,
         level,
         np.vstack((clocks, clocks)),
-        np.concatenate((np.where(own, _STEADY, _FREE), np.full(len(own), _ROUGH))),
+        np.concatenate((np.where(named, _STEADY, _FREE), np.full(len(named), _ROUGH))),
         np.concatenate((grains[0], np.maximum(grains[1], law.grain))),
         start,
         limit,
-        np.tile(np.where(own, law.spread, np.maximum(law.spread, 1.0)), 2),
-        np.concatenate((np.where(own, _OWN_BENDS, _BENDS), np.full(len(own), _BENDS))),
-        np.concatenate((np.where(own, _OWN_AHEAD, _AHEAD), np.full(len(own), _AHEAD))),
+        np.tile(np.where(named, law.spread, np.maximum(law.spread, 1.0)), 2),
+        np.concatenate((np.where(named, _OWN_BENDS, _BENDS), np.full(len(named), _BENDS))),
+        np.concatenate((np.where(named, _OWN_AHEAD, _AHEAD), np.full(len(named), _AHEAD))),
     )
