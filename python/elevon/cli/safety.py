@@ -51,7 +51,8 @@ def safety(
 
 def _print(values: dict[str, Any]) -> None:
     answer(
-        f"{values['status'].upper()}: {values['unsafe']} of {values['runs']} situations show a hazard"
+        f"{values['status'].upper()}: {values['unsafe']} of {values['runs']} situations "
+        "show a hazard"
     )
     print_table(
         ["hazard", "rows", "listed", "by one failure", "per hour"],
