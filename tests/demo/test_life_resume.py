@@ -67,7 +67,7 @@ class Story:
             "elevon.logs.read.read_drive_logs": lambda paths, **_options: paths,
             "elevon.calibrate.calibrate": self.calibrate,
             "elevon.calibrate.write.write_calibration": self.write,
-            "elevon.prognose.respond": self.step("tables", tables()),
+            "elevon.demo.life.run.respond": self.step("tables", tables()),
             "elevon.diagnose.engine.diagnose": self.diagnose,
             "elevon.demo.life.page.life_report": self.step("report", Report("life")),
             "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",

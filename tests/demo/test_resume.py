@@ -183,12 +183,12 @@ class Chain:
             "elevon.reproduce.backlash.reproduce_backlash": self.backlash,
             "elevon.reproduce.backlash.page.backlash_report": lambda _result: Report("backlashes"),
             "elevon.logs.read.log_of": lambda path: path,
-            "elevon.logs.importing.import_log": lambda path, **_options: path,
-            "elevon.logs.importing.same_rate": lambda _logs: None,
+            "elevon.demo.run.import_log": lambda path, **_options: path,
+            "elevon.demo.run.same_rate": lambda _logs: None,
             "elevon.logs.drive.drive_log": lambda path: SimpleNamespace(name=path.name),
-            "elevon.calibrate.calibrate": self.calibrate,
+            "elevon.demo.run.calibrate": self.calibrate,
             "elevon.calibrate.write.write_calibration": self.write,
-            "elevon.calibrate.validate": self.validate,
+            "elevon.demo.run.validate": self.validate,
             "elevon.demo.page.demo_report": self.report,
         }
         for name, function in replaced.items():

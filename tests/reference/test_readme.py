@@ -23,6 +23,7 @@ LONG = (
     "reproduce nasa-",
     "reproduce pisa-",
     "studies prognosis",
+    "studies foreign",
 )
 """These take ten seconds and more; the short ones run with every `make test`, once."""
 

@@ -15,6 +15,7 @@ STUDIES = (
     "diagnosis-limits",
     "diagnosis-optimisers",
     "fault-limits",
+    "foreign",
     "inspection-error",
     "monitor-delay",
     "next-test",
