@@ -195,7 +195,7 @@ class LiveUnit:
         elif "." in name:
             if isinstance(value, bool) or not isinstance(value, (int, float, str)):
                 raise ArgumentTypeError(f"{name}: {value!r:.60} is no value")
-            self._announced(lambda: self._session.set_parameter(name, value), tunable=[name])
+            self._session.set_parameter(name, value)
             self.inputs[name], self.changed_at = value, self.time
         else:
             raise unknown("input", name, [*ranges, *self.actuator.parameters], "set")
@@ -226,10 +226,7 @@ class LiveUnit:
         others = [other for key, other in self.faults.items() if key != name]
         if resolved["severity"] != 0.0:
             check_together([*others, fault])
-        attributes = dict(fault.attributes)
-        self._announced(
-            lambda: self._session.set_fault(name, severity, **attributes), faults=[name]
-        )
+        self._session.set_fault(name, severity, **dict(fault.attributes))
         self.faults.pop(name, None)
         if resolved["severity"] != 0.0:
             self.faults[name] = fault
@@ -237,13 +234,6 @@ class LiveUnit:
     def restart(self) -> None:
         """Begin anew from rest, with the faults and parameters as they are; time goes on."""
         self._anew({})
-
-    def _announced(self, change: Any, **what: list[str]) -> None:
-        """Make a change, with the equations that it needs."""
-        announce = getattr(self._session, "announce", None)
-        if announce is not None and (self.fidelity == "high" or "tunable" in what):
-            announce(**what)
-        change()
 
     def _begin(self, actuator: Actuator, initial: Mapping[str, float]) -> Session:
         scenario = {"duration": 1.0, "command": {"mode": self.mode}, "initial": dict(initial)}
@@ -253,7 +243,7 @@ class LiveUnit:
             scenario,
             fidelity=self.fidelity,
             seed=self.seed,
-            faults=self._expected(),
+            faults=fault_names(actuator.wiring, self.fidelity),
             signals=[name for name in _FILTERED if name in known],
         )
         for name, fault in self.faults.items():
@@ -265,12 +255,6 @@ class LiveUnit:
             if name in ports:
                 session.set(**{name: value})
         return session
-
-    def _expected(self) -> list[str]:
-        """Return the faults held from the start: at low fidelity all, they cost next to nothing."""
-        if self.fidelity == "high" and hasattr(Session, "announce"):
-            return list(self.faults)
-        return fault_names(self.actuator.wiring, self.fidelity)
 
     def _change_mode(self, mode: str) -> None:
         from elevon import _core
