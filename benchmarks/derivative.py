@@ -1,6 +1,6 @@
 """Where the speed controller's derivative action becomes unstable, beside the law that checks it.
 
-    python benchmarks/derivative.py         # the table of docs/theory/derivative.md, seconds
+    python benchmarks/derivative.py         # docs/explanation/theory/derivative.md: seconds
 
 Speed mode, 30 rad/s against a brake of 1 N m, 0.1 s. Unstable: the torque reference of the last
 40 ms scatters by more than 2 N m. The limit is found by bisection on K_p, with the core's check set

@@ -1,1 +1,1 @@
-"""Tests of the toolkit; see docs/architecture.md for the rooms they mirror."""
+"""Tests of the toolkit; see docs/explanation/architecture.md for the rooms they mirror."""

@@ -25,7 +25,7 @@ def test_the_four_documented_commands(tmp_path, monkeypatch, capsys):
     """From a logger's file to a validated set; then a machine that has changed fails."""
     root = Path(__file__).resolve().parents[2]
     section = (
-        (root / "docs" / "calibration.md")
+        (root / "docs" / "explanation" / "calibration.md")
         .read_text()
         .split("## Logs with few channels")[1]
         .split("\n## ")[0]

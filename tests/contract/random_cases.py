@@ -21,9 +21,8 @@ APART = 0.10
 MOST, LEAST = 2, 0.1
 #: Features in which a motor stalled at the current cut-off parts, and what states it.
 CUT_OFF = ("current_mean", "motor_torque")
-STATED = (
-    "docs/theory/landing-gear.md: at the current cut-off the reduced-order model holds its peak"
-)
+PAGE = "docs/explanation/theory/landing-gear.md"
+STATED = f"{PAGE}: at the current cut-off the reduced-order model holds its peak"
 #: Least share of the run for which a motor that counts as stalled stands there.
 AT_CUT_OFF = 0.05
 #: A servo's run covers one swing, s; a gear's is as long as its actions.

@@ -1,4 +1,4 @@
-"""`docs/architecture.md` names every part of the package and every function of the seam."""
+"""The architecture page names every part of the package and every function of the seam."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from elevon import _core
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
 
 
 def test_every_package_is_in_the_table_and_every_row_is_a_package() -> None:

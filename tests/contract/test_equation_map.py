@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 ROWS = re.findall(
     r"^\| ([TNP]\d?[^|]*) \| ([^|]+) \| `([^`]+)` \|$",
-    (ROOT / "docs" / "equations.md").read_text(encoding="utf-8"),
+    (ROOT / "docs" / "explanation" / "equations.md").read_text(encoding="utf-8"),
     flags=re.MULTILINE,
 )
 

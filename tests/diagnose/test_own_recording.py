@@ -1,4 +1,4 @@
-"""Recordings that Elevon wrote: their scenario is their note, as docs/logs.md says."""
+"""Recordings that Elevon wrote: their scenario is their note, as docs/reference/logs.md says."""
 
 import numpy as np
 import pytest

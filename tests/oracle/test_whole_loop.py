@@ -312,7 +312,8 @@ def test_located_crossings_follow_the_oracle_itself(step: float, band: float) ->
 def test_located_crossings_have_no_bias_over_longer_runs() -> None:
     """Means of 100 bands over 0.2 s at 1 and 4 us: transitions to 2 %, RMS currents to 0.1 %.
 
-    A run of 0.2 s scatters by 5 % and 0.2 %, a mean of 100 by a tenth of it: docs/accuracy.md.
+    A run of 0.2 s scatters by 5 % and 0.2 %, a mean of 100 by a tenth of it
+    (docs/evidence/accuracy.md).
     """
     bands = [HALF_BAND * (0.98 + 0.04 * (k + 0.5) / 100) for k in range(100)]
 

@@ -75,7 +75,7 @@ def test_a_single_error_keeps_its_kind(tmp_path):
 
 
 def test_the_page_on_own_actuators_shows_sets_that_load(tmp_path):
-    page = Path(__file__).resolve().parents[2] / "docs" / "own-actuators.md"
+    page = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "own-actuators.md"
     blocks = re.findall(r"```toml\n(.*?)```", page.read_text("utf-8"), re.S)
     assert blocks
     for number, block in enumerate(blocks):

@@ -69,7 +69,7 @@ def test_deceleration_follows_the_efficiencies(load: float, speed: float) -> Non
 @pytest.mark.signature("return_jam", "screw")
 @pytest.mark.parametrize("blocked", [1, 2, 3, 4])
 def test_blocked_circuits_lower_the_efficiency(blocked: int) -> None:
-    """mu grows by b/n of the way to sliding; the table of docs/theory/ballscrew.md."""
+    """mu grows by b/n of the way to sliding; the table of docs/explanation/theory/ballscrew.md."""
     fault = {"kind": "return_jam", "place": "screw.return_channel", "severity": blocked}
     rec = run(FREE, duration=1e-3, record="screw_efficiency,screw_efficiency_aiding@1 kHz",
               scenario={"fault": [fault]}, name=NAME)  # fmt: skip

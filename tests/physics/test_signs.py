@@ -1,4 +1,4 @@
-"""Every sign of docs/theory/signs.md, by a simulation at both fidelities."""
+"""Every sign of docs/explanation/theory/signs.md, by a simulation at both fidelities."""
 
 from __future__ import annotations
 

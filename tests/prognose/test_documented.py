@@ -1,4 +1,4 @@
-"""The Python examples of docs/prognosis.md run as written."""
+"""The Python examples of docs/explanation/prognosis.md run as written."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LAW, PROGPY = re.findall(
-    r"^```python\n(.*?)^```", (ROOT / "docs/prognosis.md").read_text("utf-8"), re.M | re.S
+    r"^```python\n(.*?)^```",
+    (ROOT / "docs/explanation/prognosis.md").read_text("utf-8"),
+    re.M | re.S,
 )
 
 

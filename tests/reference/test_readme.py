@@ -13,7 +13,12 @@ import pytest
 import elevon
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = ["README.md", "docs/reproduce.md", "docs/studies.md", "docs/sessions.md"]
+PAGES = [
+    "README.md",
+    "docs/evidence/reproduce.md",
+    "docs/evidence/studies.md",
+    "docs/how-to/sessions.md",
+]
 LONG = (
     "reproduce torino-backlash",
     "reproduce torino-compliance",
@@ -139,11 +144,11 @@ def test_from_logs_to_an_answer(unit, tmp_path):
 @pytest.mark.parametrize(
     "page",
     [
-        "docs/sessions.md",
-        "docs/scenarios.md",
-        "docs/recordings.md",
-        "docs/own-actuators.md",
-        "docs/python.md",
+        "docs/how-to/sessions.md",
+        "docs/reference/scenarios.md",
+        "docs/reference/recordings.md",
+        "docs/how-to/own-actuators.md",
+        "docs/how-to/python.md",
     ],
 )
 def test_examples_of_a_page(page, tmp_path):
@@ -162,7 +167,11 @@ def test_examples_of_a_page(page, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "page", ["docs/own-actuators.md", pytest.param("docs/tutorial.md", marks=pytest.mark.long)]
+    "page",
+    [
+        "docs/how-to/own-actuators.md",
+        pytest.param("docs/start/tutorial.md", marks=pytest.mark.long),
+    ],
 )
 def test_commands_of_a_page_in_their_order(page, tmp_path):
     """The commands of a page build on each other: all of them run in one folder, as written."""
@@ -179,12 +188,12 @@ def test_commands_of_a_page_in_their_order(page, tmp_path):
             )
             assert done.returncode == 0, f"{line}\n{done.stderr}"
             variant = tmp_path / "mine.toml"
-            if words[1] == "new" and page == "docs/own-actuators.md":
+            if words[1] == "new" and page == "docs/how-to/own-actuators.md":
                 variant.write_text(_blocks(page, "toml")[0], "utf-8")
 
 
 def test_scenarios_page_holds_a_scenario(tmp_path):
-    (tmp_path / "a.toml").write_text(_blocks("docs/scenarios.md", "toml")[0], "utf-8")
+    (tmp_path / "a.toml").write_text(_blocks("docs/reference/scenarios.md", "toml")[0], "utf-8")
     scenario = elevon.Scenario.load(tmp_path / "a.toml")
     run = elevon.simulate(
         "torino-rotary", scenario, fidelity="low", record="output_position@100 Hz"
@@ -194,7 +203,8 @@ def test_scenarios_page_holds_a_scenario(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "page", [*PAGES, *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))]
+    "page",
+    ["README.md", *(str(path.relative_to(ROOT)) for path in sorted((ROOT / "docs").rglob("*.md")))],
 )
 def test_links_and_pictures_are_there(page):
     text = (ROOT / page).read_text("utf-8")

@@ -85,7 +85,7 @@ def test_rows_are_what_the_command_prints(load_kind: Any) -> None:
 
 
 def test_limits_follow_the_voltage_circle_and_the_current() -> None:
-    """Each limit binds where it should; the numbers of docs/theory/ballscrew.md."""
+    """Each limit binds where it should; the numbers of docs/explanation/theory/ballscrew.md."""
     able = Capability.of(actuator())
     assert able.rate(8500.0) == (pytest.approx(0.15, rel=1e-6), "control.speed_limit")
     assert able.voltage_rate(8500.0) == pytest.approx(0.172, abs=0.002)

@@ -23,7 +23,7 @@ from elevon.reproduce.pisa_failures_page import failures_report, matrix, summary
 from elevon.reproduce.pisa_gear import ACTUATOR
 from tests.physics.gear import gear
 
-PAGE = Path(__file__).parents[2] / "docs" / "landing-gear-failures.md"
+PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "landing-gear-failures.md"
 COLUMNS = {"fault", "phase", "indicated", "true_state", "safe", "detected_by", "time_s"}
 
 

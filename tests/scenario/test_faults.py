@@ -14,7 +14,7 @@ import elevon
 from elevon.errors import InputError, RangeError, UnknownNameError
 from elevon.faults import Fault, Profile, catalogue, check_together, find_record
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "faults.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "reference" / "faults.md"
 
 
 def resolved(text, fidelity="high"):

@@ -1,4 +1,7 @@
-"""The plan file: what varies, how, and how the runs are split (grammar: ``docs/campaigns.md``)."""
+"""The plan file: what varies, how, and how the runs are split.
+
+Grammar: ``docs/reference/campaigns.md``.
+"""
 
 from __future__ import annotations
 

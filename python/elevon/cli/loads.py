@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from elevon.loads import FlightData, LoadTable
 
 app = typer.Typer(
-    rich_markup_mode=None, help="Turn a recorded flight into an actuator's load (docs/loads.md)."
+    rich_markup_mode=None,
+    help="Turn a recorded flight into an actuator's load (docs/how-to/loads.md).",
 )
 
 KINDS = (".csv", ".toml")
@@ -27,7 +28,7 @@ KINDS = (".csv", ".toml")
 def loads(
     flight: Annotated[
         Path,
-        typer.Argument(metavar="FLIGHT.csv", help="Columns with units; see docs/loads.md."),
+        typer.Argument(metavar="FLIGHT.csv", help="Columns with units; see docs/how-to/loads.md."),
     ],
     *,
     actuator: ActuatorOption,

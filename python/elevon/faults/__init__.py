@@ -1,6 +1,6 @@
 """Faults as data: kind, place, severity in a physical unit, and a profile over time.
 
-The catalogue itself comes from the core; the grammar is in ``docs/faults.md``.
+The catalogue itself comes from the core; the grammar is in ``docs/reference/faults.md``.
 """
 
 from elevon.faults.catalogue import FaultRecord, catalogue, find_record

@@ -24,8 +24,8 @@ _LEAST = 0.005  # of the severity: no diagnosis is believed to be better; ASSUME
 
 #: What all diagnoses of a unit's fault err by alike, by kind: deviation relative to the severity,
 #: and absolute [the fault's unit]. Baselines and model are the same at each inspection, so that
-#: this part of the error does not average out. Measured (docs/prognosis.md); a short's is the
-#: model's own, of either sign along the range.
+#: this part of the error does not average out. Measured (docs/explanation/prognosis.md); a short's
+#: is the model's own, of either sign along the range.
 COMMON: Mapping[str, tuple[float, float]] = {
     "backlash": (0.005, 0.0),
     "friction": (0.01, 0.02),

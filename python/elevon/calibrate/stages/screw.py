@@ -3,7 +3,7 @@
 ``k_T i = J dw/dt + C w + s (T_d + b(F) T_pr) + r F + s L(F)`` with ``s`` the sign of the motion,
 ``T_pr = F_pr r (1/eta - eta')``, ``L = (1/eta - 1) r |F|`` where the force ``F`` on the nut opposes
 the motion and ``(1 - eta') r |F|`` where it aids. ``b`` is the relieved half's share of preload: 1
-without load, 0 from 2.83 F_pr on (docs/theory/ballscrew.md).
+without load, 0 from 2.83 F_pr on (docs/explanation/theory/ballscrew.md).
 """
 
 from __future__ import annotations

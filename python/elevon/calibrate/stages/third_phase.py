@@ -4,8 +4,8 @@ With low-side chopping the pair lies at the upper rail while it is off. For half
 EMF of the third phase, ``k w u`` with ``u`` from 0 to 1 (trapezoid with flats of 120 degrees), is
 above it: ``x = k w u - V_f/2`` over ``3/2 L`` drives a current through that phase's diode, which
 falls by ``(V + V_f)/2 - x`` while the pair is on. Half of it is in the line current; it brakes
-(docs/theory/landing-gear.md). While the pair's current is continuous, which is where the balances
-look.
+(docs/explanation/theory/landing-gear.md). While the pair's current is continuous, which is where
+the balances look.
 """
 
 from __future__ import annotations

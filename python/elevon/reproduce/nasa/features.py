@@ -24,7 +24,7 @@ ORDERS = {
     "current reference, order 9": 9.0,
 }
 """Lines of the current reference per motor turn: unbalance, channel mismatch, turn short, groove
-spall, dynamic eccentricity (docs/theory/ballscrew.md)."""
+spall, dynamic eccentricity (docs/explanation/theory/ballscrew.md)."""
 FEATURES = (RMS, *ORDERS, PEAK)
 UNITS = dict.fromkeys(FEATURES, "A") | {PEAK: "N"}
 _ROOTED = np.array([name in ORDERS for name in FEATURES])
