@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import elevon
 from elevon import Actuator
 from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.surrogate.population import FAULTS
@@ -144,6 +145,11 @@ def test_a_file_that_is_no_result(tmp_path):
             read_result(tmp_path / "r.json")
     with pytest.raises(InputError, match="rotary"):
         next_test(Actuator.load("nasa-ballscrew"))
+
+
+def test_a_diagnosis_without_hypotheses_is_no_result():
+    with pytest.raises(FormatError, match=r"the diagnosis: .* no 'hypotheses'"):
+        elevon.next_test("torino-rotary", [{"status": "faulty", "faults": []}])
 
 
 def test_the_command_line(elevon_cli, monkeypatch, tmp_path):  # noqa: F811

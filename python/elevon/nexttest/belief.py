@@ -128,21 +128,23 @@ def _merged(possible: Possible, results: Sequence[Possible]) -> Possible:
     return replace(possible, centre=tuple(centre.tolist()), deviation=tuple(deviation.tolist()))
 
 
-def read_result(path: str | Path) -> dict[str, object]:
-    """Read what `elevon diagnose --json` printed.
+def read_result(result: Mapping[str, object] | str | Path) -> dict[str, object]:
+    """Take what `elevon diagnose --json` printed, from a file or as a mapping, and check it.
 
     Raises
     ------
     FormatError
         No such file, no JSON, or no diagnosis of a rotary actuator.
     """
+    given = isinstance(result, Mapping)
     try:
-        data = json.loads(read_regular(path, _LONGEST))
+        data = result if isinstance(result, Mapping) else json.loads(read_regular(result, _LONGEST))
         Answered.of(data)
     except (OSError, ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
+        place = "the diagnosis" if given else f"{result}"
         raise FormatError(
-            f"{path}: not a result of elevon diagnose --json of a rotary actuator: {why}"
+            f"{place}: not a result of elevon diagnose --json of a rotary actuator: {why}"
         ) from error
     return dict(data)
 

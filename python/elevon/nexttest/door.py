@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.engine.answer import Diagnosis
@@ -36,15 +37,19 @@ def next_test(
 
     Raises
     ------
+    FormatError
+        A result that is none, or that lists no hypotheses.
     InputError
         An actuator that it does not serve; results that contradict each other.
     """
     data = [
-        item.to_dict()
-        if isinstance(item, Diagnosis)
-        else item
-        if isinstance(item, Mapping)
-        else read_result(os.fspath(item))
+        read_result(
+            item.to_dict()
+            if isinstance(item, Diagnosis)
+            else item
+            if isinstance(item, Mapping)
+            else Path(item)
+        )
         for item in results
     ]
     return choose(as_actuator(actuator), data, progress=progress)
