@@ -17,7 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from elevon.errors import ElevonError, InputError
 from elevon.live.control import Control, ControlError
-from elevon.live.frames import SnapshotWriter
+from elevon.live.frames import RATE, SharedFrames, SnapshotWriter
 from elevon.live.guard import MOST_BYTES, POLICY, Guard, message_of
 from elevon.plain import plain
 from elevon.results import finite
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from elevon.live.loop import LiveLoop
 
 
-RATE = 30.0  # snapshots a second
 _STATE = 6  # snapshots to a state
 _SEND = 20.0  # s in which a viewer must take a snapshot
 _MOST_SIGNALS = 64  # of one viewer
@@ -74,6 +73,7 @@ class LiveApp:
 
     def __init__(self, bench: Exhibit, guard: Guard) -> None:
         self.bench, self.guard, self.control = bench, guard, Control()
+        self._frames = SharedFrames(bench.loop.ring, lambda: _text(self._now()))
         self.asgi = Starlette(
             routes=[
                 Route("/", self._page),
@@ -145,7 +145,7 @@ class LiveApp:
             return
         await socket.accept()
         name = self.control.join()
-        writer = SnapshotWriter(self.bench.loop.ring)
+        writer = SnapshotWriter(self._frames)
         tasks = {
             asyncio.create_task(self._send(socket, name, writer)),
             asyncio.create_task(self._receive(socket, name, writer)),
@@ -163,20 +163,22 @@ class LiveApp:
         """Send snapshots as fast as the viewer takes them, thirty a second at most.
 
         Each is made when the one before has gone: nothing queues, what is missed is thinned.
+        All viewers are served at the same instants, so that what they have in common is made once.
         """
+        loop, wall = self.bench.loop, asyncio.get_running_loop().time
         with suppress(WebSocketDisconnect, RuntimeError, TimeoutError, OSError):
             await _within(socket.send_text(_text({"viewer": name})))
-            number, due = 0, asyncio.get_running_loop().time()
+            noted, tick = -1, int(wall() * RATE)
             while True:
-                if number % _STATE == 0:
-                    state = {**self._now(), "mine": self.control.holder == name}
-                    await _within(socket.send_text(_text({"state": state})))
-                loop = self.bench.loop
-                packed = writer.pack(loop.source.time, loop.reached_factor, loop.factor)
+                if tick // _STATE != noted:
+                    noted = tick // _STATE
+                    mine = json.dumps(self.control.holder == name)
+                    state = self._frames.state(noted)
+                    await _within(socket.send_text(f'{{"mine": {mine}, "state": {state}}}'))
+                packed = writer.pack(tick, loop.source.time, loop.reached_factor, loop.factor)
                 await _within(socket.send_bytes(packed))
-                number += 1
-                due = max(due + 1.0 / RATE, asyncio.get_running_loop().time())
-                await asyncio.sleep(due - asyncio.get_running_loop().time())
+                await asyncio.sleep(max(0.0, (tick + 1) / RATE - wall()))
+                tick = max(tick + 1, int(wall() * RATE))
 
     async def _receive(self, socket: WebSocket, name: str, writer: SnapshotWriter) -> None:
         """Take messages of a viewer: its choice of signals, and acts as `/act` has them."""

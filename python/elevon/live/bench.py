@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,13 +94,11 @@ class LiveBench:
         """Return time, factor, values, health, and how the bench stands."""
         unit, recorder = self.unit, self.recorder
         self.panel.refresh(unit)
-        _, _, rows = self.loop.ring.since(self.loop.ring.written - 1, range(len(unit.names)), 1)
-        values = rows[-1] if len(rows) else np.full(len(unit.names), math.nan)
         status, message = unit.status
         return {
             "time": unit.time,
             "factor": self.loop.reached_factor,
-            "values": dict(zip(unit.names, values.tolist(), strict=True)),
+            "values": dict(zip(unit.names, self.loop.ring.latest().tolist(), strict=True)),
             "health": self.watch.health.to_dict(),
             "status": status,
             "message": message,

@@ -7,6 +7,7 @@ import threading
 import time as clock
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from elevon.errors import RangeError
@@ -72,6 +73,7 @@ class LiveLoop:
         """End, and wait for it."""
         self._stop.set()
         if self._thread.is_alive():
+            self._todo.put(lambda: None)
             self._thread.join()
 
     def call(self, work: Callable[[], Value], timeout: float = 10.0) -> Value:
@@ -91,19 +93,19 @@ class LiveLoop:
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            self._actions()
-            if self.paused:
-                self._stop.wait(_WAKE)
-            elif not self._behind():
+            if self.paused or not self._behind():
                 self._measure()
-                self._stop.wait(_WAKE)
+                self._actions(_WAKE)
+            else:
+                self._actions(0.0)
 
-    def _actions(self) -> None:
-        while True:
-            try:
+    def _actions(self, wait: float) -> None:
+        """Do what was asked for; wait for the first of it [s]: an act wakes the loop."""
+        with suppress(queue.Empty):
+            if wait:
+                self._todo.get(timeout=wait)()
+            while True:
                 self._todo.get_nowait()()
-            except queue.Empty:
-                return
 
     def _behind(self) -> bool:
         """Go on to the clock's instant; True where it is not reached yet."""

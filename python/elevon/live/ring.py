@@ -47,26 +47,32 @@ class SampleRing:
         """Return the columns of signals; one that is not there is left out."""
         return [self._column[name] for name in names if name in self._column]
 
-    def since(self, first: int, columns: Sequence[int], most: int) -> tuple[int, Floats, Floats]:
-        """Return the samples from a number on, thinned to `most` rows, and the next number.
+    def between(
+        self, first: int, last: int, columns: Sequence[int], most: int
+    ) -> tuple[Floats, Floats]:
+        """Return the samples of a range of numbers, thinned to `most` rows.
 
         Returns
         -------
-        (int, ndarray of shape (n,), ndarray of shape (n, k))
-            Number of the sample that comes next, instants [s], values.
+        (ndarray of shape (n,), ndarray of shape (n, k))
+            Instants [s], values.
         """
         with self._lock:
             first = max(first, self.written - self.rows, 0)
-            stride = max(1, -(-(self.written - first) // most))
+            stride = max(1, -(-(last - first) // most))
             # Counted from the newest, so that the picture is never late.
-            picked = np.arange(self.written - 1, first - 1, -stride)[::-1] % self.rows
+            picked = np.arange(last - 1, first - 1, -stride)[::-1] % self.rows
             time, values = (
                 self._time[picked],
                 self._values[np.ix_(picked, np.asarray(columns, dtype=np.intp))],
             )
-            following = self.written
         known = np.isfinite(time)
-        return following, time[known], values[known]
+        return time[known], values[known]
+
+    def latest(self) -> Floats:
+        """Return the newest sample, shape (k,); NaN before the first."""
+        with self._lock:
+            return np.array(self._values[(self.written - 1) % self.rows])
 
     def stretch(self, begin: float, columns: Sequence[int]) -> tuple[Floats, Floats]:
         """Return the samples later than an instant [s]: times (n,), values (n, k)."""

@@ -1,6 +1,6 @@
 // The command page of the real bench: its blocks, its switches, its watch table; the gear lever.
 
-import { digits, element } from "./dom.js";
+import { digits, element, put } from "./dom.js";
 
 // Names as on the bench's page; each block is enabled by its own switch and the blocks add up.
 function blocks(unit) {
@@ -97,6 +97,8 @@ export class CommandPage {
       ? [["state", digits(values.state, 2)], ["fault_code", digits(values.fault_code, 2)], ["warning_code", digits(values.warning_code, 2)], ["command_refused", digits(values.command_refused, 1)], ["locked", values.locked > 0.5 ? "TRUE" : "FALSE"], ["brake_released", values.brake_released > 0.5 ? "TRUE" : "FALSE"]]
       : [["abilita (enabled)", panel.enabled], ["home", panel.homing ? "homing" : panel.homed], ["move_pos_abs", panel.moving], ["ActVelocity", `${digits((values.motor_speed ?? 0) * 30 / Math.PI, 4)} rpm`], ["SpeedSp", `${digits((values.speed_ref ?? 0) * 30 / Math.PI, 4)} rpm`], ["ErrorSinaSpeed", state.status !== "ok"], ["Status", state.status]];
     const cell = value => value === true ? "TRUE" : value === false ? "FALSE" : value ?? "–";
-    this.watch.replaceChildren(...rows.map(([name, value]) => element("tr", {}, element("td", {}, name), element("td", {}, cell(value)))));
+    if (this.watch.rows.length !== rows.length)
+      this.watch.replaceChildren(...rows.map(([name]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", {}))));
+    rows.forEach(([, value], k) => put(this.watch.rows[k].cells[1], "text", String(cell(value))));
   }
 }

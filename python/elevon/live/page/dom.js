@@ -21,6 +21,25 @@ export const element = (name, attributes, ...children) =>
 export const drawn = (name, attributes, ...children) =>
   filled(document.createElementNS(SVG, name), attributes, children);
 
+// Sets an attribute, or the text, only where it changes: what stands still is not painted again.
+export function put(node, key, value) {
+  const was = node.was ??= {};
+  if (was[key] === value) return;
+  was[key] = value;
+  if (key === "text") node.textContent = value;
+  else if (value === null) node.removeAttribute(key);
+  else node.setAttribute(key, value);
+}
+
+// Whether a node is on the screen, without asking the layout for it.
+export class Sight {
+  constructor(node) {
+    this.seen = true;
+    this.watch = new IntersectionObserver(entries => { this.seen = entries.at(-1).isIntersecting; });
+    this.watch.observe(node);
+  }
+}
+
 export function digits(value, count = 3) {
   if (value == null || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);

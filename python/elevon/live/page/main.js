@@ -1,7 +1,7 @@
 // The page: a source of snapshots, what is drawn of them, what is sent back.
 
 import { CommandPage } from "./command.js";
-import { by, digits, element, toShown } from "./dom.js";
+import { by, digits, element, put, toShown } from "./dom.js";
 import { Picture } from "./picture.js";
 import { Phasor, Plots, Spectrum } from "./plots.js";
 import { Faults, Loads, Parameters, Records } from "./sliders.js";
@@ -12,7 +12,7 @@ const FACTORS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100], WINDOWS = [2, 5, 10,
 
 class Page {
   constructor(source, model) {
-    Object.assign(this, { source, model, store: new Store(), state: null, time: 0, frames: 0 });
+    Object.assign(this, { source, model, store: new Store(), state: null, time: 0, frames: 0, pictures: 0, latency: null });
     this.unit = Object.fromEntries(model.signals.map(signal => [signal.name, signal]));
     this.send = message => this.act(message);
   }
@@ -104,10 +104,12 @@ class Page {
   }
 
   async act(message) {
+    const begun = performance.now();
     const answer = await this.source.act(message).catch(() => ({ error: "the bench does not answer" }));
+    if (answer.time != null) this.acted = { begun, time: answer.time };
     const files = answer.files?.map(path => path.split("/").at(-1)).join(", ");
-    by("message").textContent = answer.error ?? (files ? `written: ${files}` : "");
-    by("message").dataset.good = answer.error ? "0" : "1";
+    put(by("message"), "text", answer.error ?? (files ? `written: ${files}` : ""));
+    put(by("message"), "data-good", answer.error ? "0" : "1");
     return answer;
   }
 
@@ -116,29 +118,48 @@ class Page {
     this.store.add(frame, names);
     this.frames += 1;
     this.time = frame.time;
-    by("time").textContent = `${frame.time.toFixed(1)} s`;
-    by("reached").textContent = `×${frame.factor.toFixed(2)}`;
-    if (!this.waiting) { this.waiting = true; requestAnimationFrame(now => this.draw(now)); }
+    this.factor = frame.factor;
+    if (this.waiting) return;
+    this.waiting = true;
+    this.arrived = performance.now();
+    requestAnimationFrame(now => this.draw(now));
   }
 
   draw(now) {
     this.waiting = false;
-    this.picture?.draw(this.store.latest, now);
-    this.phasor.draw(this.store.latest);
-    this.plots.draw(this.store.count ? this.store.time[this.store.count - 1] : this.time);
+    const begin = performance.now(), newest = this.store.count ? this.store.time[this.store.count - 1] : this.time;
+    const legible = now - (this.numbered ?? 0) > 200;
+    if (legible) this.numbers(now);
+    this.picture?.draw(this.store.latest, now, legible);
+    this.phasor.draw(this.store.latest, legible);
+    this.plots.draw(newest, begin - this.arrived);
     if (now - (this.spectrumDrawn ?? 0) > 500) { this.spectrum.draw(); this.spectrumDrawn = now; }
-    this.drawnAt = now;
+    this.pictures += 1;
+    if (this.acted && newest > this.acted.time) {
+      this.latency = performance.now() - this.acted.begun;
+      this.acted = null;
+    }
+  }
+
+  numbers(now) {
+    const past = now - (this.numbered ?? now);
+    this.rate = past > 0 ? (this.pictures - this.counted) * 1000 / past : 0;
+    Object.assign(this, { numbered: now, counted: this.pictures });
+    put(by("time"), "text", `${this.time.toFixed(1)} s`);
+    put(by("reached"), "text", `×${this.factor.toFixed(2)}`);
+    this.plots.readAll();
   }
 
   show(state) {
     this.state = state;
-    by("status").textContent = state.message ? `${state.status}: ${state.message}` : state.status;
-    by("status").dataset.bad = ["ok", "ended"].includes(state.status) ? "0" : "1";
-    by("pause").textContent = state.paused ? "Go on" : "Pause";
-    by("pause").setAttribute("aria-pressed", state.paused);
+    put(by("status"), "text", state.message ? `${state.status}: ${state.message}` : state.status);
+    put(by("status"), "data-bad", ["ok", "ended"].includes(state.status) ? "0" : "1");
+    put(by("pause"), "text", state.paused ? "Go on" : "Pause");
+    put(by("pause"), "aria-pressed", String(state.paused));
     if (document.activeElement !== by("factor")) by("factor").value = state.factor_asked;
     const control = state.control;
-    by("control").textContent = !control ? "recorded" : state.mine ? "you have control" : control.held ? "another viewer has control" : `control is free, ${control.viewers} viewer${control.viewers === 1 ? "" : "s"}`;
+    put(by("control"), "text", !control ? "recorded" : state.mine ? "you have control" : control.held ? "another viewer has control" : `control is free, ${control.viewers} viewer${control.viewers === 1 ? "" : "s"}`);
+    if (by("about").open) put(by("rates"), "text", `${digits(this.rate, 2)} pictures a second; the last act was seen after ${this.latency == null ? "–" : this.latency.toFixed(0)} ms.`);
     this.health(state.health);
     this.command.show(state);
     this.faults.show(state);
@@ -146,17 +167,25 @@ class Page {
   }
 
   health(health) {
-    const strip = by("health"), words = { faulty: "FAULTY", healthy: "HEALTHY", waiting: "WAITING", unknown_fault: "UNKNOWN FAULT", model_does_not_fit: "MODEL DOES NOT FIT" };
-    strip.dataset.status = health.status;
-    by("verdict").textContent = words[health.status] ?? health.status;
-    if (by("sentence").textContent !== health.text) by("sentence").textContent = health.text;
-    by("since").textContent = health.since == null ? "" : `seen ${Math.max(0, this.time - health.since).toFixed(0)} s ago`;
+    const words = { faulty: "FAULTY", healthy: "HEALTHY", waiting: "WAITING", unknown_fault: "UNKNOWN FAULT", model_does_not_fit: "MODEL DOES NOT FIT" };
+    put(by("health"), "data-status", health.status);
+    put(by("verdict"), "text", words[health.status] ?? health.status);
+    put(by("sentence"), "text", health.text);
+    put(by("since"), "text", health.since == null ? "" : `${health.onset ? "began" : "seen"} ${Math.max(0, this.time - health.since).toFixed(0)} s ago`);
     const chance = health.p_fault ?? 0;
-    by("fill").setAttribute("width", (100 * chance).toFixed(1));
-    by("meter").setAttribute("aria-valuenow", chance.toFixed(3));
-    by("remaining").textContent = health.remaining ?? "";
+    put(by("fill"), "width", (100 * chance).toFixed(1));
+    put(by("meter"), "aria-valuenow", chance.toFixed(3));
+    put(by("remaining"), "text", health.remaining ?? "");
+    const told = JSON.stringify([health.p_fault, health.watch, health.faults]);
+    if (told === this.told) return;
+    this.told = told;
     const p = health.p_fault == null ? [] : [element("li", {}, "p(fault) ", element("b", {}, digits(chance, 3)))];
-    by("causes").replaceChildren(...p, ...health.faults.filter(fault => fault.probability >= 0.1).map(fault => this.cause(fault)));
+    by("causes").replaceChildren(...p, ...this.watched(health.watch), ...health.faults.filter(fault => fault.probability >= 0.1).map(fault => this.cause(fault)));
+  }
+
+  // What the monitor says: its statistic in units of its threshold.
+  watched(watch) {
+    return watch?.statistic == null ? [] : [element("li", {}, "monitor ", element("b", {}, watch.alarm ? "ALARM" : "quiet"), `, statistic ${digits(watch.statistic, 2)} of its threshold`)];
   }
 
   cause(fault) {

@@ -1,7 +1,10 @@
 // The mechanism, drawn from the signals: motor, gear with its backlash, screw and nut, lever, lock.
 
-import { digits, drawn } from "./dom.js";
+import { Sight, digits, drawn, put } from "./dom.js";
 
+// Numbers change five times a second: faster ones nobody reads, and each is laid out anew.
+let readable = true;
+const say = (node, words) => { if (readable) put(node, "text", words); };
 const turn = (angle, x, y) => `rotate(${(angle * 180 / Math.PI).toFixed(2)} ${x} ${y})`;
 const text = (x, y, words, kind = "label", anchor = "start") => drawn("text", { x, y, class: kind, "text-anchor": anchor }, words);
 
@@ -29,16 +32,16 @@ class Motor {
   }
 
   draw(v) {
-    this.rotor.setAttribute("transform", turn(v.motor_position ?? 0, this.x, this.y));
+    put(this.rotor, "transform", turn(v.motor_position ?? 0, this.x, this.y));
     const [a, b, c] = [v.current_a, v.current_b, v.current_c];
     if ([a, b, c].every(Number.isFinite)) {
       const p = (2 * a - b - c) / 3, q = (b - c) / Math.sqrt(3);
       this.top = Math.max(this.top * 0.995, Math.hypot(p, q));
       const scale = this.radius * 0.72 / this.top;
-      this.flux.setAttribute("x2", (this.x + p * scale).toFixed(1));
-      this.flux.setAttribute("y2", (this.y - q * scale).toFixed(1));
+      put(this.flux, "x2", (this.x + p * scale).toFixed(1));
+      put(this.flux, "y2", (this.y - q * scale).toFixed(1));
     }
-    this.speed.textContent = `${digits((v.motor_speed ?? 0) * 30 / Math.PI, 3)} rpm`;
+    say(this.speed, `${digits((v.motor_speed ?? 0) * 30 / Math.PI, 3)} rpm`);
   }
 }
 
@@ -60,12 +63,12 @@ class Gap {
     this.high = Math.max(difference, middle + half * 0.9995);
     const width = (this.high - this.low) * this.scale, at = ((difference - this.low) / Math.max(this.high - this.low, 1e-12) - 0.5);
     const open = 8 + 42 * (1 - Math.exp(-width / this.unit.typical));
-    const { x, y } = this, shape = (cx, way) => `M${cx} ${y - 36} h${way * 26} v72 h${-way * 26} l${way * 6} -36 z`;
-    this.left.setAttribute("d", shape(x - 18 - open / 2, -1));
-    this.right.setAttribute("d", shape(x + 18 + open / 2, 1));
-    const t = x + at * open;
-    this.tooth.setAttribute("d", `M${t - 14} ${y + 30} L${t - 20} ${y - 8} L${t - 8} ${y - 30} h16 L${t + 20} ${y - 8} L${t + 14} ${y + 30} z`);
-    this.words.textContent = `${digits(width, 2)} ${this.unit.shown}`;
+    const { x, y } = this, shape = (cx, way) => `M${cx.toFixed(1)} ${y - 36} h${way * 26} v72 h${-way * 26} l${way * 6} -36 z`;
+    put(this.left, "d", shape(x - 18 - open / 2, -1));
+    put(this.right, "d", shape(x + 18 + open / 2, 1));
+    const t = Number((x + at * open).toFixed(1));
+    put(this.tooth, "d", `M${t - 14} ${y + 30} L${t - 20} ${y - 8} L${t - 8} ${y - 30} h16 L${t + 20} ${y - 8} L${t + 14} ${y + 30} z`);
+    say(this.words, `${digits(width, 2)} ${this.unit.shown}`);
   }
 }
 
@@ -81,13 +84,13 @@ class Arrow {
 
   draw(value, top, unit) {
     const present = Number.isFinite(value) && Math.abs(value) > 1e-9;
-    this.node.toggleAttribute("hidden", !present);
+    put(this.node, "hidden", present ? null : "");
     if (!present) return;
     const length = -55 * Math.max(-1, Math.min(1, value / top)), way = Math.sign(length);
     const end = this.x + length;
-    this.line.setAttribute("x2", end.toFixed(1));
-    this.head.setAttribute("d", `M${end + way * 8} ${this.y} l${-way * 10} -6 v12 z`);
-    this.words.textContent = `${this.label} ${digits(value, 3)} ${unit}`;
+    put(this.line, "x2", end.toFixed(1));
+    put(this.head, "d", `M${end + way * 8} ${this.y} l${-way * 10} -6 v12 z`);
+    say(this.words, `${this.label} ${digits(value, 3)} ${unit}`);
   }
 }
 
@@ -102,14 +105,14 @@ function rotary(model) {
   const nodes = [drawn("line", { x1: 127, x2: 182, y1: 110, y2: 110, class: "frame" }), motor.node, gear, big, ghost, arm, gap.node, load.node, angle, text(182, 66, `1 : ${digits(ratio, 3)}`, "label", "middle")];
   const draw = v => {
     motor.draw(v);
-    gear.setAttribute("transform", turn(v.motor_position ?? 0, 182, 110));
-    big.setAttribute("transform", turn(-(v.output_position ?? 0) * 4, 270, 110));
-    arm.setAttribute("transform", turn(-(v.output_position ?? 0), 270, 110));
-    ghost.setAttribute("transform", turn(-(v.command ?? 0), 270, 110));
-    ghost.toggleAttribute("hidden", model.mode !== "position");
+    put(gear, "transform", turn(v.motor_position ?? 0, 182, 110));
+    put(big, "transform", turn(-(v.output_position ?? 0) * 4, 270, 110));
+    put(arm, "transform", turn(-(v.output_position ?? 0), 270, 110));
+    put(ghost, "transform", turn(-(v.command ?? 0), 270, 110));
+    put(ghost, "hidden", model.mode !== "position" ? "" : null);
     gap.draw((v.resolver_position ?? v.motor_position) / ratio - (v.encoder_position ?? v.output_position));
     load.draw(v.output_torque, 60, "N m");
-    angle.textContent = `output ${digits((v.output_position ?? 0) * 180 / Math.PI, 3)}°`;
+    say(angle, `output ${digits((v.output_position ?? 0) * 180 / Math.PI, 3)}°`);
     return `Motor at ${motor.speed.textContent}, ${angle.textContent}, gap ${gap.words.textContent}`;
   };
   return { box: "0 0 560 225", nodes, draw };
@@ -119,7 +122,7 @@ function screwPattern(x, y, length) {
   const rod = drawn("rect", { x, y: y - 7, width: length, height: 14, class: "metal" });
   const lines = Array.from({ length: Math.ceil(length / 12) + 2 }, (_, k) => drawn("line", { x1: x + 12 * k, x2: x + 12 * k + 8, y1: y - 7, y2: y + 7, class: "thin" }));
   const clip = drawn("svg", { x, y: y - 8, width: length, height: 16, viewBox: `${x} ${y - 8} ${length} 16` }, drawn("g", {}, ...lines));
-  return { node: drawn("g", {}, rod, clip), draw: phase => clip.firstChild.setAttribute("transform", `translate(${(((phase % 1) + 1) % 1) * 12 - 12} 0)`) };
+  return { node: drawn("g", {}, rod, clip), draw: phase => put(clip.firstChild, "transform", `translate(${((((phase % 1) + 1) % 1) * 12 - 12).toFixed(2)} 0)`) };
 }
 
 function ballscrew(model) {
@@ -135,13 +138,13 @@ function ballscrew(model) {
     motor.draw(v);
     const at = 225 + (v.motor_position ?? 0) * lead * scale, out = 225 + (v.output_position ?? 0) * scale;
     screw.draw((v.motor_position ?? 0) / (2 * Math.PI));
-    nut.setAttribute("transform", `translate(${at.toFixed(2)} 105)`);
-    ram.setAttribute("transform", `translate(${(out + 24).toFixed(2)} 105)`);
-    mark.setAttribute("transform", `translate(${(225 + (v.command ?? 0) * scale).toFixed(2)} 125)`);
-    mark.toggleAttribute("hidden", model.mode !== "position");
+    put(nut, "transform", `translate(${at.toFixed(2)} 105)`);
+    put(ram, "transform", `translate(${(out + 24).toFixed(2)} 105)`);
+    put(mark, "transform", `translate(${(225 + (v.command ?? 0) * scale).toFixed(2)} 125)`);
+    put(mark, "hidden", model.mode !== "position" ? "" : null);
     gap.draw((v.motor_position ?? 0) * lead - (v.output_position ?? 0));
     load.draw(v.load_force, 5000, "N");
-    words.textContent = `ram ${digits((v.output_position ?? 0) * 1000, 3)} mm`;
+    say(words, `ram ${digits((v.output_position ?? 0) * 1000, 3)} mm`);
     return `Motor at ${motor.speed.textContent}, ${words.textContent}, gap ${gap.words.textContent}`;
   };
   return { box: "0 0 500 245", nodes, draw };
@@ -149,7 +152,7 @@ function ballscrew(model) {
 
 const lamp = (x, y, label) => {
   const dot = drawn("circle", { cx: x, cy: y, r: 6, class: "off" });
-  return { node: drawn("g", {}, dot, text(x, y + 18, label, "label", "middle")), set: on => dot.setAttribute("class", on > 0.5 ? "on" : "off") };
+  return { node: drawn("g", {}, dot, text(x, y + 18, label, "label", "middle")), set: on => put(dot, "class", on > 0.5 ? "on" : "off") };
 };
 
 function landingGear(model) {
@@ -168,23 +171,23 @@ function landingGear(model) {
   const draw = v => {
     motor.draw(v);
     const share = Math.max(-0.05, Math.min(1.05, (v.output_position ?? 0) / stroke)), nutAt = 190 + 95 * (v.nut_position ?? v.output_position ?? 0) / stroke, ramAt = 196 + 95 * share;
-    first.setAttribute("transform", turn(-(v.motor_position ?? 0) / (g["gear.ratio_first"] ?? 4), 122, 92));
-    second.setAttribute("transform", turn((v.motor_position ?? 0) / 18, 160, 92));
+    put(first, "transform", turn(-(v.motor_position ?? 0) / (g["gear.ratio_first"] ?? 4), 122, 92));
+    put(second, "transform", turn((v.motor_position ?? 0) / 18, 160, 92));
     screw.draw((v.motor_position ?? 0) / (2 * Math.PI) / 18);
-    nut.setAttribute("transform", `translate(${nutAt.toFixed(2)} 0)`);
-    ram.setAttribute("x", ramAt.toFixed(2));
+    put(nut, "transform", `translate(${nutAt.toFixed(2)} 0)`);
+    put(ram, "x", ramAt.toFixed(2));
     if (Number.isFinite(v.lever_angle)) { least = Math.min(least, v.lever_angle); most = Math.max(most, v.lever_angle); }
     const angle = 85 * (1 - share) * Math.PI / 180;
-    leg.setAttribute("transform", turn(-angle, ...hinge));
+    put(leg, "transform", turn(-angle, ...hinge));
     const tip = [hinge[0] - 36 * Math.cos(angle) + 16 * Math.sin(angle) * 1, hinge[1] + 16 * Math.cos(angle) + 36 * Math.sin(angle)];
-    strut.setAttribute("x1", (ramAt + 110).toFixed(1)); strut.setAttribute("x2", tip[0].toFixed(1)); strut.setAttribute("y2", tip[1].toFixed(1));
+    put(strut, "x1", (ramAt + 110).toFixed(1)); put(strut, "x2", tip[0].toFixed(1)); put(strut, "y2", tip[1].toFixed(1));
     const locked = (v.locked ?? 0) > 0.5;
-    lock.setAttribute("transform", `translate(${locked ? 250 : 257} ${locked ? 134 : 128})`);
-    body.setAttribute("class", locked ? "on" : "off");
-    lockWords.textContent = locked ? "locked" : "unlocked";
+    put(lock, "transform", `translate(${locked ? 250 : 257} ${locked ? 134 : 128})`);
+    put(body, "class", locked ? "on" : "off");
+    say(lockWords, locked ? "locked" : "unlocked");
     lamps.forEach(item => item.set(v[item.name] ?? 0));
     load.draw(v.load_force, 8000, "N");
-    words.textContent = `ram ${digits((v.output_position ?? 0) * 1000, 3)} mm`;
+    say(words, `ram ${digits((v.output_position ?? 0) * 1000, 3)} mm`);
     return `Motor at ${motor.speed.textContent}, ${words.textContent}, gear ${lockWords.textContent}`;
   };
   return { box: "0 0 500 225", nodes, draw };
@@ -205,10 +208,13 @@ export class Picture {
     this.svg = drawn("svg", { viewBox: box, role: "img", "aria-label": "mechanism" }, ...nodes);
     host.replaceChildren(this.svg);
     this.named = 0;
+    this.sight = new Sight(host);
   }
 
-  draw(values, now) {
+  draw(values, now, legible) {
+    if (!this.sight.seen) return;
+    readable = legible;
     const words = this.drawParts(values);
-    if (now - this.named > 2000) { this.svg.setAttribute("aria-label", words); this.named = now; }
+    if (now - this.named > 2000) { put(this.svg, "aria-label", words); this.named = now; }
   }
 }

@@ -1,9 +1,12 @@
 // Scrolling plots with uPlot, the spectrum of a signal, the phasor of the phase currents.
 
-import { by, digits, drawn, element } from "./dom.js";
+import { Sight, by, digits, drawn, element, put } from "./dom.js";
 
 const COLOURS = ["#2f7fd1", "#e0782f", "#2f9e6e", "#d1483c", "#8a6fd0", "#8a929d", "#b8860b", "#0f8b8d"];
-const ink = () => getComputedStyle(document.body).color;
+const dark = matchMedia("(prefers-color-scheme: dark)");
+let colour = null; // asked of the style once a theme: each question would lay the page out
+const ink = () => colour ??= getComputedStyle(document.body).color;
+dark.addEventListener("change", () => { colour = null; });
 const GRID = { stroke: "rgba(128,128,128,.25)", width: 1 };
 const axis = (label, size, space) => ({ label, labelSize: 18, size, stroke: ink, grid: GRID, ticks: GRID, space, font: "11px system-ui", labelFont: "11px system-ui" });
 
@@ -16,9 +19,11 @@ export class Plots {
     this.charts = [];
     this.frozen = null;
     this.seconds = 10;
+    this.turn = 0;
+    this.quota = 1;
     this.sync = uPlot.sync("live");
     model.plots.forEach(plot => this.add(plot.title, plot.signals));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
+    dark.addEventListener("change", () => this.redraw());
   }
 
   get names() {
@@ -28,10 +33,12 @@ export class Plots {
   add(title, names) {
     const close = element("button", { "aria-label": `remove the plot ${title}` }, "×");
     const place = element("div", { class: "chart" });
+    const values = names.map(() => element("b", {}));
+    const keys = names.map((name, k) => element("li", {}, drawn("svg", { viewBox: "0 0 10 10", "aria-hidden": "true" }, drawn("rect", { width: 10, height: 10, fill: COLOURS[k % COLOURS.length] })), name, values[k]));
     const host = element("section", { class: "chart", "aria-label": `plot: ${title}` },
-      element("h3", {}, title, close), place);
+      element("h3", {}, title, close), place, element("ul", { class: "keys" }, ...keys));
     by("charts").append(host);
-    const chart = { title, names, host, place, zoomed: false };
+    const chart = { title, names, host, place, values, zoomed: false, sight: new Sight(host) };
     close.onclick = () => this.remove(chart);
     chart.plot = this.made(chart);
     chart.watch = new ResizeObserver(() => chart.plot.setSize({ width: this.width(chart), height: 170 }));
@@ -42,6 +49,7 @@ export class Plots {
 
   remove(chart) {
     chart.watch.disconnect();
+    chart.sight.watch.disconnect();
     chart.plot.destroy();
     chart.host.remove();
     this.charts = this.charts.filter(other => other !== chart);
@@ -51,37 +59,49 @@ export class Plots {
   width(chart) { return Math.max(200, chart.place.clientWidth); }
 
   made(chart) {
-    const units = chart.names.map(name => this.unit[name]);
-    const series = chart.names.map((name, k) => ({ label: name, stroke: COLOURS[k % COLOURS.length], width: 1.4,
-      points: { show: false }, value: (_, v) => v == null ? "–" : `${digits(v, 4)} ${units[k].shown}` }));
-    const options = { width: this.width(chart), height: 170, series: [{ label: "t", value: (_, v) => v == null ? "–" : `${v.toFixed(3)} s` }, ...series],
-      cursor: { sync: { key: this.sync.key, scales: ["x", null] } },
-      scales: { x: { time: false } }, axes: [axis("", 26, 60), axis(units[0]?.shown ?? "", 54, 26)],
-      hooks: { setSelect: [() => { chart.zoomed = true; }] } };
+    const unit = this.unit[chart.names[0]];
+    const series = chart.names.map((name, k) => ({ label: name, stroke: COLOURS[k % COLOURS.length], width: 1.4, points: { show: false } }));
+    const options = { width: this.width(chart), height: 170, series: [{ label: "t" }, ...series], legend: { show: false },
+      cursor: { sync: { key: this.sync.key, scales: ["x", null] }, points: { show: false } },
+      scales: { x: { time: false } }, axes: [axis("", 26, 60), axis(unit?.shown ?? "", 54, 26)],
+      hooks: { setSelect: [() => { chart.zoomed = true; }], setCursor: [() => this.read(chart)] } };
     const plot = new uPlot(options, [[], ...chart.names.map(() => [])], chart.place);
     plot.over.addEventListener("dblclick", () => { chart.zoomed = false; });
     return plot;
   }
 
+  // Values under the cursor, else the newest.
+  read(chart) {
+    const at = chart.plot?.cursor.idx;
+    chart.names.forEach((name, k) => {
+      const unit = this.unit[name], latest = this.store.latest[name];
+      const value = at != null ? chart.plot.data[k + 1][at] : latest == null ? null : latest * unit.scale + unit.offset;
+      put(chart.values[k], "text", `${digits(value, 4)} ${unit.shown}`);
+    });
+  }
+
+  readAll() { this.charts.forEach(chart => { if (chart.sight.seen) this.read(chart); }); }
+
   redraw() { this.charts.forEach(chart => chart.plot.redraw()); }
 
   hold(time) { this.frozen = time; }
 
-  draw(now) {
-    const end = this.frozen ?? now;
-    for (const chart of this.charts) {
-      if (chart.zoomed || !visible(chart.host)) continue;
-      const units = chart.names.map(name => this.unit[name]);
-      const data = this.store.window(chart.names, units, this.seconds, end, 400);
+  // The charts in turn, as many a picture as leave it in time: `lag` [ms] is how long it has waited.
+  draw(now, lag) {
+    const charts = this.charts.filter(chart => !chart.zoomed && chart.sight.seen);
+    this.quota = Math.max(1, Math.min(charts.length, this.quota + (lag < 22 ? 0.1 : -0.5)));
+    for (let k = 0; k < Math.min(Math.floor(this.quota), charts.length); k++)
+      this.drawOne(charts[this.turn++ % charts.length], this.frozen ?? now);
+  }
+
+  drawOne(chart, end) {
+    const units = chart.names.map(name => this.unit[name]);
+    const data = this.store.window(chart.names, units, this.seconds, end, Math.max(100, chart.plot.width >> 1));
+    chart.plot.batch(() => {
       chart.plot.setData(data, false);
       chart.plot.setScale("x", { min: end - this.seconds, max: end });
-    }
+    });
   }
-}
-
-function visible(node) {
-  const box = node.getBoundingClientRect();
-  return box.bottom > 0 && box.top < innerHeight;
 }
 
 export class Spectrum {
@@ -94,12 +114,14 @@ export class Spectrum {
       scales: { x: { time: false }, y: { distr: 3 } }, axes: [axis("Hz", 24, 40), axis("", 44, 20)],
       series: [{}, { stroke: COLOURS[0], width: 1.2, points: { show: false } }] };
     this.plot = new uPlot(options, [[], []], by("spectrum"));
+    this.sight = new Sight(by("spectrum"));
     new ResizeObserver(() => this.plot.setSize({ width: Math.max(150, by("spectrum").clientWidth), height: 120 })).observe(by("spectrum"));
   }
 
   get name() { return by("spectrum-of").value; }
 
   draw() {
+    if (!this.sight.seen) return;
     const size = 1024, store = this.store, column = store.columns.get(this.name);
     if (!column || store.count < size) return;
     const first = store.count - size, last = store.count - 1;
@@ -149,23 +171,24 @@ export class Phasor {
     host.append(this.trail, ...this.phases, this.sum, this.label);
     this.points = [];
     this.top = 1e-3;
+    this.sight = new Sight(host);
   }
 
-  draw(values) {
+  draw(values, readable) {
     const currents = ["a", "b", "c"].map(phase => values[`current_${phase}`]);
-    if (!currents.every(Number.isFinite)) return;
+    if (!this.sight.seen || !currents.every(Number.isFinite)) return;
     const [a, b, c] = currents, x = (2 * a - b - c) / 3, y = (b - c) / Math.sqrt(3);
     this.top = Math.max(this.top * 0.995, Math.hypot(x, y) * 1.15, 1e-3);
     const scale = 50 / this.top;
     this.phases.forEach((line, k) => {
       const angle = 2 * Math.PI * k / 3, size = currents[k] * scale * 2 / 3;
-      line.setAttribute("x2", (size * Math.cos(angle)).toFixed(1));
-      line.setAttribute("y2", (-size * Math.sin(angle)).toFixed(1));
+      put(line, "x2", (size * Math.cos(angle)).toFixed(1));
+      put(line, "y2", (-size * Math.sin(angle)).toFixed(1));
     });
-    this.sum.setAttribute("x2", (x * scale).toFixed(1));
-    this.sum.setAttribute("y2", (-y * scale).toFixed(1));
+    put(this.sum, "x2", (x * scale).toFixed(1));
+    put(this.sum, "y2", (-y * scale).toFixed(1));
     this.points = [...this.points.slice(-40), [x, y]];
-    this.trail.setAttribute("points", this.points.map(([p, q]) => `${(p * scale).toFixed(1)},${(-q * scale).toFixed(1)}`).join(" "));
-    this.label.textContent = `${digits(Math.hypot(x, y), 3)} A`;
+    put(this.trail, "points", this.points.map(([p, q]) => `${(p * scale).toFixed(1)},${(-q * scale).toFixed(1)}`).join(" "));
+    if (readable) put(this.label, "text", `${digits(Math.hypot(x, y), 3)} A`);
   }
 }

@@ -139,6 +139,9 @@ export class Faults {
     this.state = state;
     const set = state.injected;
     if (!set) return;
+    const told = JSON.stringify(set);
+    if (told === this.told) return;
+    this.told = told;
     for (const [name, slider] of this.sliders)
       if (!slider.waiting && !slider.node.contains(document.activeElement)) slider.node.dataset.set = name in set ? "1" : "0";
   }

@@ -58,7 +58,7 @@ export class LiveSource {
       }
       const message = JSON.parse(event.data);
       if (message.viewer) this.viewer = message.viewer;
-      if (message.state) handlers.state(message.state);
+      if (message.state) handlers.state({ ...message.state, mine: message.mine });
     };
     this.socket.onclose = () => {
       handlers.lost();

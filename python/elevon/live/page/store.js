@@ -7,6 +7,7 @@ export class Store {
     this.time = new Float64Array(ROWS);
     this.columns = new Map();
     this.count = 0;
+    this.gone = 0; // rows that were dropped: slices begin at whole numbers of all rows
     this.latest = {};
   }
 
@@ -16,12 +17,12 @@ export class Store {
     for (const name of names)
       if (!this.columns.has(name)) this.columns.set(name, new Float32Array(ROWS).fill(NaN));
     if (this.count + rows > ROWS) this.shift(rows);
-    for (let row = 0; row < rows; row++) {
-      this.time[this.count] = times[row];
-      for (const column of this.columns.values()) column[this.count] = NaN;
-      names.forEach((name, k) => { this.columns.get(name)[this.count] = values[row * columns + k]; });
-      this.count += 1;
+    this.time.set(times, this.count);
+    for (const [name, column] of this.columns) {
+      const k = names.indexOf(name);
+      for (let row = 0; row < rows; row++) column[this.count + row] = k < 0 ? NaN : values[row * columns + k];
     }
+    this.count += rows;
     if (rows) names.forEach((name, k) => { this.latest[name] = values[(rows - 1) * columns + k]; });
   }
 
@@ -30,6 +31,7 @@ export class Store {
     this.time.copyWithin(0, by, this.count);
     for (const column of this.columns.values()) column.copyWithin(0, by, this.count);
     this.count -= by;
+    this.gone += by;
   }
 
   clear() { this.count = 0; }
@@ -45,8 +47,10 @@ export class Store {
 
   // Time and columns of a window; of each slice the least and the greatest, so that no peak is lost.
   window(names, units, seconds, end, slices) {
-    const first = this.begin(seconds, end), last = this.count, size = last - first;
-    const stride = Math.max(1, Math.ceil(size / slices));
+    const begin = this.begin(seconds, end), last = this.count;
+    const stride = Math.max(1, Math.ceil((last - begin) / slices));
+    // The same samples make a slice in each picture: peaks stand still while they scroll.
+    const first = Math.max(0, begin - (this.gone + begin) % stride);
     const time = [];
     for (let i = first; i < last; i += stride) {
       time.push(this.time[i]);
