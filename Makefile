@@ -24,7 +24,7 @@ RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name 
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo check test test-rust test-python test-long lint size stubs wheel bench format lock audit licences clean
+.PHONY: help setup demo check test test-rust test-python test-long lint size stubs docs wheel bench format lock audit licences clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -79,6 +79,13 @@ size: $(STAMPS)/packages ## code lines of the Python package, and public signatu
 stubs: $(STAMPS)/extension ## the hand-written stub against the built extension
 	cd $(STAMPS) && ../$(BIN)/python -m mypy.stubtest elevon._core
 
+$(STAMPS)/docs: requirements-docs.lock $(STAMPS)/packages
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-docs.lock
+	@touch $@
+
+docs: setup $(STAMPS)/docs ## the documentation site, its links followed: out/docs/index.html
+	$(BIN)/python tools/pages/build.py
+
 wheel: $(STAMPS)/packages ## the wheel for this system in dist/, checked where there is no compiler
 	$(BIN)/maturin build --release --quiet --locked --out dist
 	$(BIN)/python tools/check_wheel.py dist
@@ -95,6 +102,9 @@ lock: $(BIN)/python ## choose the newest packages again, for Python 3.11 and up
 	$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
 		--no-emit-index-url --no-emit-find-links --upgrade --quiet --generate-hashes \
 		--custom-compile-command "make lock" --output-file requirements.lock
+	$(BIN)/uv pip compile pyproject.toml --extra docs --universal --python-version 3.11 --constraint requirements.lock \
+		--no-emit-index-url --no-emit-find-links --quiet --generate-hashes \
+		--custom-compile-command "make lock" --output-file requirements-docs.lock
 
 audit: $(STAMPS)/packages ## known flaws of the dependencies of both languages; needs a network and cargo-deny, pip-audit
 	@command -v cargo-deny >/dev/null || { echo "make audit needs cargo-deny: cargo install --locked cargo-deny" >&2; exit 1; }
