@@ -125,10 +125,11 @@ class Pages:
         for path in sorted((ROOT / "examples").glob("*.py")):
             if path.stem == "synthetic_flight":  # a program with arguments, for the loads page
                 continue
-            said = re.match(r'"""(.*?)"""\n', path.read_text("utf-8"), re.S)
+            text = path.read_text("utf-8")
+            docstring = re.match(r'"""(.*?)"""\n', text, re.S)
             title = path.stem.replace("_", " ").capitalize()
-            head = f'"""\n{title}\n{"=" * len(title)}\n\n{said.group(1).strip()}\n"""\n'
-            self.write(Path("_examples") / path.name, head + path.read_text("utf-8")[said.end() :])
+            head = f'"""\n{title}\n{"=" * len(title)}\n\n{docstring.group(1).strip()}\n"""\n'
+            self.write(Path("_examples") / path.name, head + text[docstring.end() :])
 
     def sweep(self) -> None:
         """Remove what an earlier build wrote and this one did not."""

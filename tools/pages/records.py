@@ -80,8 +80,8 @@ def _command(command: Any, path: str) -> str:
     context = command.context_class(command, info_name=f"elevon {path}")
     usage = command.get_usage(context).removeprefix("Usage: ")
     text = f"{_help(command.help)}\n\n```text\n{usage}\n```\n\n"
-    shown = [item.get_help_record(context) for item in command.params]
-    rows = [[code(name), plain(meaning)] for name, meaning in filter(None, shown)]
+    lines = [item.get_help_record(context) for item in command.params]
+    rows = [[code(name), plain(meaning)] for name, meaning in filter(None, lines)]
     rows = [row for row in rows if "-completion" not in row[0]]
     if rows:
         text += table(["name", "meaning"], rows) + "\n"
