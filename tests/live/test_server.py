@@ -156,7 +156,7 @@ def test_what_was_done_is_a_scenario(live, tmp_path):
     scenario = Scenario.load(path)
     assert scenario.command.terms[0].kind == "sine"
     assert scenario.fault[0].kind == "friction"
-    assert scenario.loads.output.terms[0].arguments["final"] == "4 N m"
+    assert scenario.loads.output.terms[-1].arguments["final"] == "4.0 N m"
     assert answer["steps"][-1]["fault"] == {"friction@transmission": 0.5}
     live.act(restart=True, fault={"friction@transmission": 0})
 

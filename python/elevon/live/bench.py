@@ -16,6 +16,7 @@ from elevon.live.journal import Journal, moved_command
 from elevon.live.loop import LiveLoop
 from elevon.live.panel import WatchTable
 from elevon.live.recorder import Recorder, free_name
+from elevon.live.script import Script
 from elevon.live.trace import Stretch, trace_signals, write_stretch
 
 if TYPE_CHECKING:
@@ -23,7 +24,10 @@ if TYPE_CHECKING:
 
 
 #: What a message to `act` may hold, in the order in which it is done.
-KEYS = ("restart", "factor", "pause", "set", "fault", "panel", "block", "command", "record", "save")
+KEYS = (
+    "restart", "repeat", "factor", "pause", "set", "fault", "panel", "block", "command", "record",
+    "save",
+)  # fmt: skip
 _LOOK = 10.0  # s of a log that are diagnosed; two periods of a slower sine
 _LONGEST = 30.0
 _SHORTEST = 8.0
@@ -65,7 +69,8 @@ class LiveBench:
         self.loop = LiveLoop(unit, factor)
         self.folder = folder or Path()
         self.panel = WatchTable()
-        self.journal = Journal(unit.actuator, unit.fidelity, unit.seed)
+        self.journal = Journal(unit)
+        self.script = Script()
         self.hide_truth = hide_truth
         self.recorder: Recorder | None = None
         self.files: list[Path] = []
@@ -108,6 +113,7 @@ class LiveBench:
             "command": None if unit.given is None else dict(unit.given),
             "inputs": dict(unit.inputs),
             "recording": None if recorder is None else self._recording(recorder),
+            "repeating": self.script.to_dict(),
             "files": [path.name for path in self.files],
             "injected": None if self.hide_truth else self._injected(),
         }
@@ -121,7 +127,8 @@ class LiveBench:
             ``command`` (as in a scenario file, runs at once), ``block`` (the same, waits for
             ``panel: move``), ``panel``, ``set`` (inputs and parameters), ``fault`` (``KIND@PLACE``
             to severity), ``record`` (``drive`` or true, ``full``, false), ``factor``, ``pause``,
-            ``restart``, ``save`` (returns the scenario of what was done).
+            ``restart``, ``save`` (returns the scenario and the steps of what was done), ``repeat``
+            (does such steps again, from rest, each at its instant).
 
         Raises
         ------
@@ -140,17 +147,32 @@ class LiveBench:
 
     def _act(self, message: Mapping[str, Any]) -> dict[str, Any]:
         answer: dict[str, Any] = {}
-        for key in KEYS:
-            if key in message:
-                getattr(self, f"_do_{key}")(message[key], answer)
-        done = {key: message[key] for key in KEYS if key in message}
-        self.journal.note(self.unit.time, done)
+        done: dict[str, Any] = {}
+        try:
+            for key in KEYS:
+                if key in message:
+                    getattr(self, f"_do_{key}")(message[key], answer)
+                    done[key] = message[key]
+        finally:
+            self.journal.note(done)
         return {"time": self.unit.time, **answer}
 
     def _do_restart(self, given: Any, _: dict[str, Any]) -> None:
         if _switch("restart", given):
             self.unit.restart()
-            self.panel = WatchTable()
+            self._begun()
+
+    def _do_repeat(self, given: Any, _: dict[str, Any]) -> None:
+        script = Script.read(given, KEYS)
+        self.unit.renew(script.mode or self.unit.mode)
+        self._begun()
+        self.script = script
+        self.script.due(self.unit.time, self._act)
+
+    def _begun(self) -> None:
+        """Begin what counts from a start from rest."""
+        self.panel, self.script = WatchTable(), Script()
+        self.journal.begin()
 
     def _do_factor(self, given: Any, _: dict[str, Any]) -> None:
         if isinstance(given, bool) or not isinstance(given, (int, float)):
@@ -194,13 +216,16 @@ class LiveBench:
         self.recorder = Recorder(kind, names, list(columns), self.unit.period)
 
     def _do_save(self, given: Any, answer: dict[str, Any]) -> None:
+        if self.hide_truth:
+            raise InputError("save: the truth is hidden, and what was done would tell it")
         if _switch("save", given):
-            answer["scenario"] = self.journal.scenario(self.unit.time)
+            answer["scenario"] = self.journal.scenario()
             answer["steps"] = self.journal.steps()
 
     def _sampled(self, time: float, values: Sequence[float]) -> None:
         if self.recorder is not None:
             self.recorder(time, values)
+        self.script.due(time, self._act)
 
     def _recording(self, recorder: Recorder) -> dict[str, Any]:
         begun = recorder.begun
@@ -242,7 +267,7 @@ class LiveBench:
                 "actuator": self.unit.actuator.name,
                 "fidelity": self.unit.fidelity,
                 "seed": self.unit.seed,
-                "steps": json.dumps(self.journal.steps()),
+                "steps": "" if self.hide_truth else json.dumps(self.journal.steps()),
             },
         )
         path = free_name(self.folder, f"live-{self.unit.actuator.name}-full", ".csv")

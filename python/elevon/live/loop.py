@@ -111,7 +111,7 @@ class LiveLoop:
         """Go on to the clock's instant; True where it is not reached yet."""
         begin = clock.perf_counter()
         while self.source.time < self._target():
-            self._sample()
+            self.sample()
             if clock.perf_counter() - begin > _BUSY:
                 if self._target() - self.source.time > _LATE * self._factor:
                     self._rebase(measured=True)
@@ -119,7 +119,8 @@ class LiveLoop:
                 return True
         return False
 
-    def _sample(self) -> None:
+    def sample(self) -> None:
+        """Go on by one sample, whatever the clock says."""
         before = self.source.time
         values = self.source.step()
         time = self.source.time

@@ -20,8 +20,6 @@ from elevon.plain import plain
 from elevon.results import finite
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from elevon.arrays import Floats
     from elevon.live.bench import LiveBench
     from elevon.live.replay import LogReplay
@@ -94,7 +92,7 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
     unit = bench.unit
     command, fault = _SHOWS[unit.actuator.wiring]
     times: list[float] = []
-    rows: list[Sequence[float]] = []
+    rows: list[Floats] = []
     states: list[dict[str, Any]] = []
     broken, noted = False, -np.inf
     bench.panel.run(unit, command)
@@ -103,11 +101,10 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
         if not broken and unit.time >= _BROKEN:
             bench.act({"fault": fault})
             broken = True
-        values = unit.step()
-        bench.loop.ring.append(unit.time, values)
+        bench.loop.sample()
         if len(rows) == 0 or bench.loop.ring.written % _EVERY == 0:
             times.append(unit.time)
-            rows.append(values)
+            rows.append(bench.loop.ring.latest())
         if unit.time - noted >= _STATES:
             noted = unit.time
             states.append(_state(bench))

@@ -233,7 +233,16 @@ class LiveUnit:
 
     def restart(self) -> None:
         """Begin anew from rest, with the faults and parameters as they are; time goes on."""
-        self._anew({})
+        self._anew(self.now, {})
+
+    def renew(self, mode: str) -> None:
+        """Begin anew from rest as at the very start: healthy, nothing set; time goes on."""
+        if mode not in wirings()[self.actuator.wiring]["modes"]:
+            raise unknown("mode", mode, wirings()[self.actuator.wiring]["modes"], "repeat")
+        self.mode, self.given = mode, None
+        self.faults.clear()
+        self.inputs.clear()
+        self._anew(self.actuator, {})
 
     def _begin(self, actuator: Actuator, initial: Mapping[str, float]) -> Session:
         scenario = {"duration": 1.0, "command": {"mode": self.mode}, "initial": dict(initial)}
@@ -262,12 +271,12 @@ class LiveUnit:
         self.mode = mode
 
         names = [n for n in _core.initial(self.actuator.wiring, self.fidelity) if n in self.names]
-        self._anew(self._session.read(*names))
+        self._anew(self.now, self._session.read(*names))
 
-    def _anew(self, initial: Mapping[str, float]) -> None:
+    def _anew(self, actuator: Actuator, initial: Mapping[str, float]) -> None:
         begun = self.time
-        self._session = self._begin(self.now, initial)
-        self._begun, self._actions = begun, []
+        self._session = self._begin(actuator, initial)
+        self._begun, self._actions, self._last_action = begun, [], 0.0
         self._look()
 
     def _look(self) -> None:

@@ -1,6 +1,6 @@
 // Loads, faults and parameters as sliders in their unit.
 
-import { element, toShown, toSi } from "./dom.js";
+import { element, put, toShown, toSi } from "./dom.js";
 
 // A slider's way is the cube of its share: fine near zero, where severities that matter are.
 class Slider {
@@ -162,7 +162,7 @@ export class Records {
       element("fieldset", {}, element("legend", {}, "what was done"), element("div", { class: "row" },
         element("button", { id: "save", onclick: () => this.save() }, "Save as scenario"),
         element("button", { id: "link", onclick: () => this.link() }, "Copy a link")),
-        this.again = element("div", { class: "row" })));
+        this.again = element("div", { class: "row" }), this.repeating = element("p", { role: "status" })));
     this.linked();
   }
 
@@ -189,23 +189,14 @@ export class Records {
     let steps;
     try { steps = JSON.parse(decodeURIComponent(location.hash.slice(4))); } catch { return; }
     if (!Array.isArray(steps)) return;
-    this.again.replaceChildren(element("button", { id: "linked", onclick: () => this.repeat(steps) }, `Do the link's ${steps.length} steps`));
-  }
-
-  // The link's acts at their instants, from rest.
-  async repeat(steps) {
-    await this.act({ restart: true });
-    const begin = this.now ?? 0, first = steps[0]?.time ?? 0;
-    for (const { time, restart, ...step } of steps) {
-      while ((this.now ?? 0) - begin < time - first) await new Promise(done => setTimeout(done, 10));
-      await this.act(step);
-    }
+    this.again.replaceChildren(element("button", { id: "linked", onclick: () => this.act({ repeat: steps }) }, `Do the link's ${steps.length} steps`));
   }
 
   show(state) {
-    this.now = state.time;
     const running = state.recording;
-    this.status.textContent = running ? `recording (${running.kind}): ${running.seconds.toFixed(1)} s` : "no recording";
+    const { left, error } = state.repeating ?? {};
+    put(this.repeating, "text", error ? `the link stopped: ${error}` : left ? `${left} steps of the link to go` : "");
+    put(this.status, "text", running ? `recording (${running.kind}): ${running.seconds.toFixed(1)} s` : "no recording");
     const names = state.files ?? [];
     if (names.length === this.files.childElementCount) return;
     this.files.replaceChildren(...names.map(name => element("li", {}, element("a", { href: this.source.fileAddress(name), download: name }, name))));
