@@ -19,6 +19,14 @@ SPREADS = {
     "screw.nut_capacity": 0.2, "screw.nut_to_air": 0.2,
 }  # fmt: skip
 LOSS = 0.3  # the same, of what each efficiency loses
+#: Median error of a number that the logs bear; of friction, whose law has more than its numbers.
+SHARE, OF_FRICTION = 0.02, 0.05
+#: Where they do not: largest median of the fit's own deviation. ASSUMED, half of what counts as not
+#: determined.
+BOUND = 0.10
+#: Deviations within which the median error must lie; of five draws it lies beyond by chance once in
+#: a hundred times.
+HALF = 1.645
 
 
 def drawn(seed, name="nasa-ballscrew"):
@@ -50,3 +58,18 @@ def make_logs(model, procedures, *, seed, fidelity):
             name = f"{ready.name}-{setup.trace.name}"
             logs.append(role_log(run_loaded(setup, fidelity)[0], name, model))
     return logs
+
+
+def missed(path, errors, deviations):
+    """Return why the draws do not show a number; empty: they do.
+
+    From its relative errors and the fit's own relative deviations. The median error is within the
+    share asked for, or, where the logs do not bear that, within what the fit itself states, which
+    must be small enough to be worth stating.
+    """
+    errors, deviations = np.abs(errors), np.asarray(deviations)
+    share = OF_FRICTION if path.startswith("friction.") else SHARE
+    error, stated, size = np.median(errors), np.median(deviations), np.median(errors / deviations)
+    if error < share or (size < HALF and stated < BOUND):
+        return ""
+    return f"{path}: median error {error:.3f}, {size:.2f} deviations of {stated:.3f}"

@@ -64,7 +64,7 @@ class ParameterSet(Mapping[str, Parameter]):
         self._items = MappingProxyType(items)
         self._vector: npt.NDArray[np.float64] | None = None
         self._hash: str | None = None
-        self._away: Mapping[str, str] | None = None
+        self._away: Mapping[str, Parameter] | None = None
         self._known: dict[Hashable, Any] = {}
 
     def __getitem__(self, path: str) -> Parameter:
@@ -127,13 +127,13 @@ class ParameterSet(Mapping[str, Parameter]):
             self._vector.flags.writeable = False
         return self._vector
 
-    def away(self) -> Mapping[str, str]:
-        """Return what the caller changed away from neutral: path to the value as written."""
+    def away(self) -> Mapping[str, Parameter]:
+        """Return what the caller changed away from neutral, by path."""
         if self._away is None:
             known = records(self.wiring)
             self._away = MappingProxyType(
                 {
-                    path: item.text
+                    path: item
                     for path, item in self._items.items()
                     if item.changed and item.value != known[path].default_value()
                 }

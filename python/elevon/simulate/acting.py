@@ -76,11 +76,14 @@ def _resting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> l
     ]
 
 
-def _reasons(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> dict[str, str]:
+def _reasons(
+    actuator: Actuator, compiled: CompiledScenario, fidelity: str, *, every: bool = False
+) -> dict[str, str]:
     """Return what the caller set, each with why it has no effect; empty where it has one.
 
     Of the parameters those count that the caller changed, not what an actuator file carries for
-    another drive; of the faults those of a severity other than zero.
+    another drive; of the faults those of a severity other than zero. Parameters that have an effect
+    are there with `every` only: to write out their values costs more than the rest.
     """
     from elevon import _core
 
@@ -92,7 +95,11 @@ def _reasons(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> d
     paths = [*changed, *(path for fault in faults for path in _touched(fault, actuator.wiring))]
     rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults, paths)
     idle = {item["path"]: item["reason"] for item in rows}
-    reasons = {f"{path} = {text}": idle.get(path, "") for path, text in changed.items()}
+    reasons = {
+        f"{path} = {item.text}": idle.get(path, "")
+        for path, item in changed.items()
+        if every or path in idle
+    }
     for fault in faults:
         reasons.update(_of_fault(fault, actuator.wiring, idle))
     return reasons
@@ -142,7 +149,7 @@ def together(runs: Iterable[tuple[Actuator, Scenario, str]]) -> Iterator[None]:
     for actuator, scenario, fidelity in runs:
         whole = actuator.with_values(scenario.parameters, place="scenario parameters")
         compiled = compile_scenario(scenario, actuator.wiring, fidelity)
-        for name, reason in _reasons(whole, compiled, fidelity).items():
+        for name, reason in _reasons(whole, compiled, fidelity, every=True).items():
             reasons.setdefault(name, []).append(reason)
     resting = [f"{name} has no effect: {why[0]}" for name, why in reasons.items() if all(why)]
     report([[Notice(NotActingWarning, text) for text in resting]], strict=False, stacklevel=4)

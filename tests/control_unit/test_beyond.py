@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -209,13 +210,20 @@ def test_a_flickering_switch_in_mid_stroke_unlocks_nothing(
 # ------------------------------------------------------------------ 3. pulses and weight on wheels
 
 
+@cache
+def retraction(fidelity: str, pulsed: str = "") -> Any:
+    """A whole retraction, with a pulse of a switch if one is named."""
+    pulse = during("proximity_on", f"sensor.proximity_{pulsed}", 3.0, 3.005)
+    return gear((0.1, "retract"), duration=7.5, start=EXTENDED, fidelity=fidelity,
+                faults=[pulse] if pulsed else [], record="state@1 kHz")  # fmt: skip
+
+
 @BOTH
 @pytest.mark.parametrize("switch", ["0", "25", "75", "100"])
 def test_a_pulse_of_a_switch_changes_nothing(switch: str, fidelity: str) -> None:
     """5 ms in mid-retraction: the same states at the same times."""
-    plain = gear((0.1, "retract"), duration=7.5, start=EXTENDED, fidelity=fidelity)
-    pulse = during("proximity_on", f"sensor.proximity_{switch}", 3.0, 3.005)
-    rec = gear((0.1, "retract"), duration=7.5, start=EXTENDED, faults=[pulse], fidelity=fidelity)
+    plain = retraction(fidelity)
+    rec = retraction(fidelity, switch)
     assert np.array_equal(rec["state"].values, plain["state"].values)
     assert states(rec) == [UNCONFIRMED, RETRACTING, RETRACTED]
 
