@@ -184,6 +184,14 @@ impl Runs {
         Ok(done)
     }
 
+    /// Equations from now on in which these parameters may change and these signals may be read.
+    fn announce(&mut self, tunable: Vec<String>, signals: Vec<String>) -> PyResult<()> {
+        let tunable = tunable.iter().map(|path| self.resolver.parameter(path)).collect::<PyResult<Vec<_>>>()?;
+        let signals = self.resolver.signals(&signals)?;
+        self.blocks.iter_mut().for_each(|(_, block)| block.widen(&tunable, &signals));
+        Ok(())
+    }
+
     /// A session in the same state, which goes on by itself.
     fn copy(&self) -> Self {
         Self {
@@ -317,6 +325,11 @@ impl Session {
     /// Puts a fault in a place of a run's list, or behind the last; false as `set_input`.
     fn set_fault(&self, run: usize, place: usize, fault: &Bound<'_, PyDict>) -> PyResult<bool> {
         self.on(|runs| runs.set_fault(run, place, fault))
+    }
+
+    /// Equations from now on in which these parameters may change and these signals may be read.
+    fn announce(&self, tunable: Vec<String>, signals: Vec<String>) -> PyResult<()> {
+        self.on(|runs| runs.announce(tunable, signals))
     }
 
     /// A session in the same state, which goes on by itself.

@@ -333,6 +333,33 @@ class Session:
                     raise self._left_out(name, "faults")
                 places.setdefault(name, len(places))
 
+    def announce(
+        self,
+        *,
+        tunable: Iterable[str] = (),
+        faults: Iterable[str] = (),
+        signals: Iterable[str] = (),
+    ) -> None:
+        """Say what will be changed or read from now on, as at the start; nothing moves by it.
+
+        What has run so far goes on bit for bit. Equations that were left out begin at the values
+        of a healthy unit at rest.
+
+        Parameters
+        ----------
+        tunable, faults, signals : iterable of str
+            As for the session itself.
+
+        Raises
+        ------
+        UnknownNameError
+            No such parameter, fault or signal.
+        """
+        paths = [*self._tunable(tunable), *self._moved(faults)]
+        names = [self._known(name) for name in texts(signals, "signals")]
+        self._core.announce(paths, names)
+        self._readable.clear()
+
     def run(
         self,
         duration: float | str,

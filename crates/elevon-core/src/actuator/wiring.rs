@@ -197,6 +197,8 @@ pub trait Wiring: Clone + Send + Sync + 'static {
     fn refuses_start(_raw: &[f64], _initial: &[f64]) -> Option<String> {
         None
     }
+    /// After the structure has grown while the run goes on: what joins begins where the run stands.
+    fn join<S: Scalar>(_model: &Self::Model<S>, _before: &Self::Structure, _after: &Self::Structure, _state: &mut Self::State<S>) {}
     /// State at the start; `initial` holds the values given for `INITIAL`, NaN where none was.
     fn start<S: Scalar>(model: &Self::Model<S>, raw: &[S], initial: &[S]) -> Self::State<S>;
     /// After a fault changed parameters.

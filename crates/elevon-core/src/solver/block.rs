@@ -229,6 +229,25 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         }
     }
 
+    /// Other equations from the present step on, in which all that runs so far goes on as it is; what is new ticks from the
+    /// next of its own instants on.
+    pub(super) fn widen(&mut self, structure: W::Structure, raw: &[f64], recorded: &[usize]) {
+        let ticks = W::ticks(raw, &structure);
+        let due = |tick: &Tick| {
+            let running = self.ticks.iter().position(|other| other == tick);
+            running.map_or_else(|| tick.first + self.k.saturating_sub(tick.first).next_multiple_of(tick.period), |at| self.tick_due[at])
+        };
+        self.tick_due = ticks.iter().map(due).collect();
+        self.ticks = ticks;
+        let before = std::mem::replace(&mut self.structure, structure);
+        self.selection = Signals::of(recorded);
+        self.stale = true;
+        self.renew(self.k);
+        for (model, state) in self.models.iter().zip(&mut self.states) {
+            W::join(model, &before, &self.structure, state);
+        }
+    }
+
     /// A lane gets another value of a parameter, which acts from the present step on.
     pub(super) fn set(&mut self, lane: usize, index: usize, value: f64) {
         let place = &mut self.healthy[lane / S::LANES][index];

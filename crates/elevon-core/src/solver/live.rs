@@ -2,7 +2,7 @@
 //! between steps, copies them whole. They have no clock of their own.
 
 use super::batch::{blocks, padded, shape, Monitor, Shape};
-use super::block::{feeds, Block};
+use super::block::{feeds, structure, Block};
 use super::kernels::Plain;
 use super::spec::{RunSpec, Status};
 use super::width::{with_lanes, Width};
@@ -47,6 +47,8 @@ pub trait Live: Send + Sync {
     /// Does the structure hold what these signals need?
     fn carries(&self, signals: &[usize]) -> bool;
     fn change(&mut self, run: usize, change: Change) -> Result<(), Refusal>;
+    /// From now on the equations hold these parameters' changes and these signals, too, in every run.
+    fn widen(&mut self, tunable: &[usize], signals: &[usize]);
     fn copy(&self) -> Box<dyn Live>;
 }
 
@@ -162,6 +164,15 @@ impl<W: Wiring, S: Scalar> Live for Session<W, S> {
         }
         self.block.renew(self.block.k);
         Ok(())
+    }
+
+    fn widen(&mut self, tunable: &[usize], signals: &[usize]) {
+        for run in &mut self.runs {
+            run.tunable.extend_from_slice(tunable);
+        }
+        self.recorded.extend_from_slice(signals);
+        self.shape = shape::<W>(&self.runs[0], &self.recorded);
+        self.block.widen(structure::<W>(&self.runs[0], &self.recorded), &self.runs[0].parameters, &self.recorded);
     }
 
     fn copy(&self) -> Box<dyn Live> {

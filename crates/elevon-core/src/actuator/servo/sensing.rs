@@ -75,6 +75,17 @@ impl<S: Scalar> Sensing<S> {
         Sensed { resolver, noise: [S::zero(); 2], encoder: self.encoder.start(self.encoder.interpolated(s.output_position)) }
     }
 
+    /// What the sensors remember begins at what they would show now, where nothing remembered before.
+    pub(super) fn join(&self, before: &SensingDetails, after: &SensingDetails, s: &ShaftState<S>, sensed: &mut Sensed<S>) {
+        let fresh = self.start(s);
+        if after.resolver && !before.resolver {
+            sensed.resolver = fresh.resolver;
+        }
+        if after.counting && !before.counting {
+            sensed.encoder = fresh.encoder;
+        }
+    }
+
     /// The resolver has no power or no signal.
     #[inline(always)]
     pub(super) fn lost(&self) -> S::Mask {

@@ -66,6 +66,12 @@ impl<F: Form> Wiring for High<F> {
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
         Model::derive::<F>(raw, structure)
     }
+    fn join<S: Scalar>(model: &Model<S>, before: &Structure, after: &Structure, state: &mut State<S>) {
+        model.sensing.join(&before.sensing, &after.sensing, &state.shaft, &mut state.sensed);
+        if after.measured_current && !before.measured_current {
+            (state.current_reading, state.extra.sensed) = (state.star.current, state.star.current);
+        }
+    }
     fn refuses_start(raw: &[f64], initial: &[f64]) -> Option<String> {
         crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]])
     }

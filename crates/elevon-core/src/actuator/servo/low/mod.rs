@@ -101,6 +101,10 @@ impl<F: Form> Wiring for Low<F> {
         model.lubricate(structure, state);
     }
 
+    fn join<S: Scalar>(m: &Model<S>, before: &Structure, after: &Structure, state: &mut State<S>) {
+        m.sensing.join(&before.sensing, &after.sensing, &state.shaft, &mut state.sensed);
+    }
+
     fn tick<S: Scalar>(
         kind: u8,
         structure: &Structure,
