@@ -43,11 +43,11 @@ def test_a_fault_announced_on_the_way_acts_as_one_announced_at_the_start(fault, 
 
 
 def test_announcing_moves_nothing():
-    told, untold = _moved(), _moved()
-    told.announce(faults=["unbalance@motor.rotor"], tunable=["motor.cogging_torque"])
-    for session in (told, untold):
+    announced, other = _moved(), _moved()
+    announced.announce(faults=["unbalance@motor.rotor"], tunable=["motor.cogging_torque"])
+    for session in (announced, other):
         session.advance("20 ms")
-    assert told.read(*SIGNALS) == untold.read(*SIGNALS)
+    assert announced.read(*SIGNALS) == other.read(*SIGNALS)
 
 
 def test_a_signal_is_read_once_it_is_announced():
@@ -62,7 +62,7 @@ def test_a_signal_is_read_once_it_is_announced():
     assert session["current_q_meas"] == pytest.approx(always["current_q_meas"], abs=0.05)
 
 
-def test_many_runs_are_told_together():
+def test_many_runs_are_announced_together():
     from elevon import Run
 
     scenario = {"duration": 1, "command": {"terms": [SINE]}}
