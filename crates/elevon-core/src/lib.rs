@@ -7,6 +7,7 @@ pub mod control;
 pub mod fault;
 pub mod features;
 pub mod inverter;
+pub mod kept;
 pub mod motor;
 pub mod noise;
 pub mod panics;

@@ -2,7 +2,8 @@
 
 use crate::actuator::{ballscrew, landing_gear, rotary, Finding, Machine, Port, Wiring};
 use crate::fault::{FaultKind, FaultSpec};
-use crate::solver::{self, Clock, Live, Monitor, RunOutput, RunSpec, Width};
+use crate::scalar::fused;
+use crate::solver::{self, Clock, Embedded, Live, Monitor, RunOutput, RunSpec, Width};
 use crate::variable::acts::{Fidelity, Standing};
 use crate::variable::{Group, Signal};
 
@@ -152,6 +153,10 @@ impl Model {
     /// Runs that go on from call to call, in blocks: which runs each holds, and the block.
     pub fn live(self, runs: &[RunSpec], recorded: &[usize], width: Width) -> Vec<(Vec<usize>, Box<dyn Live>)> {
         dispatch!(self, W => solver::live::<W>(runs, recorded, width))
+    }
+    /// A run by itself for whoever embeds it, in plain numbers; none where the processor has no fused multiply-add for them.
+    pub fn embedded(self, run: RunSpec, recorded: &[usize]) -> Option<Box<dyn Embedded>> {
+        fused().then(|| dispatch!(self, W => solver::embedded::<W>(run, recorded)))
     }
     /// Low fidelities without a state machine only: switching has no useful derivative.
     pub fn sensitivities(

@@ -5,7 +5,7 @@ use crate::features;
 use crate::seam::bad;
 use elevon_core::actuator::Severity;
 use elevon_core::command::{catalogue, SourcePlan, Term, Wave};
-use elevon_core::fault::{whole, FaultKind, FaultSpec, Op, Profile, Write};
+use elevon_core::fault::{whole, FaultKind, FaultSpec, Named, Profile};
 use elevon_core::registry::Model;
 use elevon_core::solver::{fault_refusal, force_refusal, parameter_refusal, Clock, RunSpec};
 use elevon_core::variable::{acts::records, Range};
@@ -104,41 +104,16 @@ fn term(d: &Bound<'_, PyDict>) -> PyResult<Term> {
 
 fn fault(model: &[FaultKind], places: &HashMap<String, usize>, d: &Bound<'_, PyDict>) -> PyResult<FaultSpec> {
     let kind: String = need(d, "kind")?.extract()?;
-    let name: String = need(d, "place")?.extract()?;
-    let found = model.iter().filter(|f| f.kind == kind).find_map(|f| f.places.iter().find(|p| p.name == name).map(|p| (f, p)));
-    let (record, place) = found.ok_or_else(|| bad(format!("no fault {kind}@{name} at this fidelity")))?;
-    let index =
-        |path: &str| places.get(path).copied().ok_or_else(|| bad(format!("fault {kind}@{name} needs {path:?}, which the actuator lacks")));
-    let writes = place.targets.iter().map(|t| Ok(Write { index: index(t.path)?, op: t.op })).collect::<PyResult<Vec<_>>>()?;
+    let place: String = need(d, "place")?.extract()?;
     let given: HashMap<String, f64> = need(d, "attributes")?.extract()?;
-    let mut settings = Vec::new();
-    let mut period = 0.0;
-    for attribute in record.attributes {
-        let Some(value) = given.get(attribute.name).copied().or(attribute.default) else {
-            continue;
-        };
-        if attribute.path.is_empty() {
-            period = value;
-            continue;
-        }
-        settings.push((index(attribute.path)?, value));
-        if !attribute.flag.is_empty() {
-            settings.push((index(attribute.flag)?, 0.0));
-        }
-    }
-    let severity: f64 = need(d, "severity")?.extract()?;
-    if !record.range.contains(severity) {
-        return Err(bad(format!("{kind}@{name}: severity {severity} is out of range")));
-    }
     let profile = need(d, "profile")?.cast_into::<PyDict>()?;
     let shape: String = need(&profile, "kind")?.extract()?;
     let numbers: Vec<f64> = need(&profile, "parameters")?.extract()?;
     let profile = Profile::new(&shape, &numbers, points(&profile, "times")?, points(&profile, "values")?)
         .ok_or_else(|| bad(format!("profile {shape:?} with {} parameters", numbers.len())))?;
-    if writes.iter().any(|w| w.op == Op::Pulse) && !(period > 0.0 && period.is_finite()) {
-        return Err(bad(format!("{kind}@{name}: period = {period} s must be positive")));
-    }
-    Ok(FaultSpec { severity, profile, writes, settings, period })
+    let severity: f64 = need(d, "severity")?.extract()?;
+    let named = Named { kind: &kind, place: &place, severity, attribute: &|name| given.get(name).copied() };
+    named.resolved(model, &|path| places.get(path).copied(), profile).map_err(bad)
 }
 
 /// How the faults of a run are called.

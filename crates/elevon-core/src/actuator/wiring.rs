@@ -3,6 +3,7 @@
 use crate::command::Source;
 use crate::control::position_speed::Mode;
 use crate::fault::FaultKind;
+use crate::kept::Store;
 use crate::scalar::Scalar;
 use crate::time::Steps;
 use crate::variable::{Group, Signal};
@@ -193,6 +194,12 @@ pub trait Wiring: Clone + Send + Sync + 'static {
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Self::Structure) -> Self::Model<S>;
+    /// The same into a model that is there, whose memory is used again.
+    fn derive_anew<S: Scalar>(model: &mut Self::Model<S>, raw: &[S], structure: &Self::Structure) {
+        *model = Self::derive(raw, structure);
+    }
+    /// Writes the state of a single run to a store, or reads it there.
+    fn keep(state: &mut Self::State<f64>, store: &mut Store);
     /// Why a run cannot start from these values for `INITIAL` together.
     fn refuses_start(_raw: &[f64], _initial: &[f64]) -> Option<String> {
         None

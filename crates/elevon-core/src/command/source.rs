@@ -1,6 +1,7 @@
 //! A sum of waveforms, compiled for a lane block.
 
 use super::term::{Oscillation, Term};
+use crate::kept::{Kept, Store};
 use crate::scalar::Scalar;
 use crate::time::{step_at, Steps};
 
@@ -98,6 +99,26 @@ impl SourceLanes {
     pub fn replace(&mut self, lane: usize, plan: SourcePlan) {
         self.plans[lane] = plan;
         (self.next[lane], self.soonest) = (0, 0);
+    }
+
+    /// Gives a lane that holds a value another one; it acts at the next renewal.
+    pub fn hold(&mut self, lane: usize, value: f64) {
+        if let Some(held) = self.plans[lane].terms.first_mut().and_then(|term| term.parameters.first_mut()) {
+            *held = value;
+        }
+        (self.next[lane], self.soonest) = (0, 0);
+    }
+
+    /// A single lane that holds a value, as a store has it.
+    pub fn keep(&mut self, store: &mut Store) {
+        let mut value = self.lines[0][1];
+        value.keep(store);
+        self.renewed.keep(store);
+        if store.reads() {
+            self.hold(0, value);
+            self.lines[0] = [0.0, value, 0.0, 0.0];
+            (self.next[0], self.soonest) = (Steps::MAX, Steps::MAX);
+        }
     }
 
     /// Renews the lanes whose breakpoint is step `k`; true if any did.

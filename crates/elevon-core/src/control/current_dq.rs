@@ -2,6 +2,7 @@
 //! (reference sheet 1.1: 4 kHz pulses). Sign convention of sheet 1.4:
 //! v_q = R i_q + L di_q/dt + p omega L i_d + k omega, v_d = R i_d + L di_d/dt - p omega L i_q.
 
+use crate::kept;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 use crate::variables;
@@ -47,6 +48,8 @@ pub struct CurrentControlState<S> {
     /// Those of the last sample, which act after the computation delay.
     computed: [S; 3],
 }
+
+kept!(CurrentControlState<f64> as CurrentControlState { integral_d, integral_q, voltage_d, voltage_q, modulation, computed });
 
 /// What the current controller sees at a tick.
 #[derive(Clone, Copy, Debug)]

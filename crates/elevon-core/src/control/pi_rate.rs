@@ -1,5 +1,6 @@
 //! PI speed control behind a rate limiter, gains by direction (P 2.1.4 and Table 2.1). It runs at control ticks.
 
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::variables;
 
@@ -21,6 +22,8 @@ pub struct PiRate {
     pub reference: f64,
     integral: f64,
 }
+
+kept!(PiRate as PiRate { reference, integral });
 
 impl PiRate {
     /// Demanded voltage, within the supply; the integral stops where it would push further into the limit.

@@ -5,7 +5,7 @@
 use crate::scalar::Scalar;
 use crate::variable::acts::When;
 use crate::variable::{Switch, View};
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     /// What a command sets.
@@ -145,6 +145,8 @@ pub struct PositionSpeedState<S> {
     /// Command of the previous tick; NaN before the first.
     command: S,
 }
+
+kept!(PositionSpeedState<f64> as PositionSpeedState { integral, filtered_error, rested, speed_ref, torque_ref, command });
 
 impl<S: Scalar> PositionSpeed<S> {
     /// `ratio` is the motor's angle over the commanded coordinate.

@@ -2,10 +2,12 @@
 //! component always contains in their healthy form.
 
 mod catalogue;
+mod named;
 mod profile;
 pub mod rate;
 mod schedule;
 
 pub use catalogue::{Attribute, FaultKind, Op, Place, Target};
+pub use named::Named;
 pub use profile::{profiles, Profile, ProfileRecord};
-pub use schedule::{whole, FaultLanes, FaultSpec, Write};
+pub use schedule::{make_whole, whole, FaultLanes, FaultSpec, Write};

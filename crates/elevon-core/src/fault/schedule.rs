@@ -2,6 +2,7 @@
 //! sample is what acts then, in the unit of the catalogue: whole numbers of what is counted, 0 or 1 of a switch.
 
 use super::{Op, Profile};
+use crate::kept::{Kept, Store};
 use crate::scalar::Scalar;
 use crate::time::{step_at, Steps};
 
@@ -114,6 +115,24 @@ impl FaultLanes {
         (self.next[lane], self.soonest) = (0, 0);
     }
 
+    /// Gives a fault of a lane another severity; it acts at the next renewal.
+    pub fn set_severity(&mut self, lane: usize, fault: usize, severity: f64) {
+        self.faults[lane][fault].severity = severity;
+        (self.next[lane], self.soonest) = (0, 0);
+    }
+
+    /// Severities of a lane and what acts of them now, as a store has them.
+    pub fn keep(&mut self, lane: usize, store: &mut Store) {
+        for (fault, value) in self.faults[lane].iter_mut().zip(&mut self.values[lane]) {
+            fault.severity.keep(store);
+            value.label.keep(store);
+            value.factor.keep(store);
+            value.pulse.keep(store);
+        }
+        self.next[lane].keep(store);
+        self.soonest = self.next.iter().copied().min().unwrap_or(Steps::MAX);
+    }
+
     pub fn count(&self, lane: usize) -> usize {
         self.faults[lane].len()
     }
@@ -136,14 +155,16 @@ impl FaultLanes {
     }
 
     /// Writes the held severities of lanes `first..` into a copy of the healthy parameters. `severity(lane,
-    /// fault)` is the severity as a scalar, so that a dual number can carry its derivative.
-    pub fn apply<S: Scalar>(&self, first: usize, raw: &mut [S], severity: &dyn Fn(usize, usize) -> S) {
+    /// fault)` is the severity as a scalar, so that a dual number can carry its derivative; only with such `slopes` a fault of
+    /// severity zero has its settings, so that many that do not act may stand side by side.
+    pub fn apply<S: Scalar>(&self, first: usize, raw: &mut [S], slopes: bool, severity: &dyn Fn(usize, usize) -> S) {
         let numbers = S::from_fn(|i| i as f64);
         for i in 0..S::LANES {
             let lane = first + i;
             let mine = numbers.equals(S::splat(i as f64));
             for (j, fault) in self.faults[lane].iter().enumerate() {
-                for &(index, value) in &fault.settings {
+                let settings = if !slopes && fault.severity == 0.0 { &[][..] } else { &fault.settings };
+                for &(index, value) in settings {
                     raw[index] = S::select(mine, S::splat(value), raw[index]);
                 }
                 let value = self.values[lane][j];
@@ -160,6 +181,12 @@ impl FaultLanes {
 /// Parameters with every fault at its whole severity.
 pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
     let mut all = raw.to_vec();
+    make_whole(&mut all, faults);
+    all
+}
+
+/// Brings healthy parameters to every fault's whole severity.
+pub fn make_whole<'a>(all: &mut [f64], faults: impl IntoIterator<Item = &'a FaultSpec>) {
     for fault in faults {
         for &(index, value) in &fault.settings {
             all[index] = value;
@@ -172,7 +199,6 @@ pub fn whole(raw: &[f64], faults: &[FaultSpec]) -> Vec<f64> {
             all[write.index] = changed(all[write.index], fault.severity, write.op, value);
         }
     }
-    all
 }
 
 fn changed<S: Scalar>(x: S, s: S, op: Op, value: ProfileValue) -> S {
@@ -202,7 +228,7 @@ mod tests {
         let mut lanes = FaultLanes::new(vec![vec![fault.clone()]], 1);
         lanes.renew((t / dt) as Steps, dt);
         let mut raw = [healthy];
-        lanes.apply::<f64>(0, &mut raw, &|_, _| fault.severity);
+        lanes.apply::<f64>(0, &mut raw, false, &|_, _| fault.severity);
         (raw[0], lanes.label(0, 0))
     }
 

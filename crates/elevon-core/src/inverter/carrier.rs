@@ -5,6 +5,7 @@
 //! of m the share of a step in which the leg is high follows in closed form, whatever the step. After each edge both
 //! switches are off for the dead time, which may reach into further steps.
 
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::three;
 
@@ -35,6 +36,8 @@ pub struct Window<S> {
     /// Edges until the window's end since the start.
     edges: S,
 }
+
+kept!(Window<f64> as Window { begin, last, rise, fall, driven, edges });
 
 /// What a step needs of its window.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@
 
 use crate::scalar::Scalar;
 use crate::variable::View;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     SourceRegeneration { Accept "accept", Block "block" }
@@ -70,6 +70,8 @@ pub struct DcLinkState<S> {
     /// Voltage that tripped the drive; 0: none has.
     trip: S,
 }
+
+kept!(DcLinkState<f64> as DcLinkState { voltage, begin, given, lost, chopping, trip });
 
 impl<S: Scalar> DcLink<S> {
     pub fn needed(view: &View<LinkParameter>) -> bool {

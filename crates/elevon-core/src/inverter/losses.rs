@@ -4,6 +4,7 @@
 //! of voltage and current transition (linear both; the law is ASSUMED, the papers' switches are ideal). One in two transitions of a
 //! period is soft: t is the mean over both.
 
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::acts::When;
@@ -68,6 +69,8 @@ pub struct DriveHeatState<S> {
     /// Given to the air since the start, J.
     pub heat_out: S,
 }
+
+kept!(DriveHeatState<f64> as DriveHeatState { temperature, begin, accounted, power, heat_out });
 
 impl<S: Scalar> DriveHeat<S> {
     pub fn derive(raw: &[S], ambient: S, period: S) -> Self {

@@ -1,7 +1,7 @@
 //! Supply with current and power limit behind a resistance, feeding the link capacitor.
 
 use crate::scalar::Scalar;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     /// What a source does with current that comes back.
@@ -41,6 +41,8 @@ pub struct Link<S> {
     pub source: S,
     pub dump: S,
 }
+
+kept!(Link<f64> as Link { source, dump });
 
 impl<S: Scalar> Supply<S> {
     pub fn derive(raw: &[S], dt: S) -> Self {

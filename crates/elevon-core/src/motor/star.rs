@@ -8,7 +8,7 @@ use crate::scalar::{three_phase, Scalar};
 use crate::three;
 use crate::variable::acts::When;
 use crate::variable::View;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     EmfShape { Sinusoidal "sinusoidal", Trapezoidal "trapezoidal" }
@@ -168,6 +168,8 @@ pub struct StarState<S> {
     pub resistance_factor: S,
     pub flux_factor: S,
 }
+
+kept!(StarState<f64> as StarState { current, contact, resistance_factor, flux_factor });
 
 fn phases<S: Scalar>(raw: &[S], first: MotorParameter) -> [S; 3] {
     three!(|j| raw[first as usize + j])

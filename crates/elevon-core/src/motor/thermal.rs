@@ -7,7 +7,7 @@
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variable::View;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 /// Stefan-Boltzmann constant, W/(m2 K4).
 const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
@@ -83,6 +83,8 @@ pub struct NetworkState<S> {
     /// 1 once the winding has passed the trip temperature.
     pub over: S,
 }
+
+kept!(NetworkState<f64> as NetworkState { winding, surface, collected, windings, apart, hottest, power, heat_in, heat_out, begin, over });
 
 impl<S: Scalar> Network<S> {
     /// `temperature` holds reference, coefficient of the resistance and of the flux; `period` the network's tick, s.

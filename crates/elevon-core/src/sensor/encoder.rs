@@ -4,6 +4,7 @@
 //! amplitudes and a phase error by a second harmonic of the period: x + T (e_1 sin(z + phi_1) + e_2 sin(2 z + phi_2)), z = 2 pi x/T,
 //! is what the counter counts.
 
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::variable::View;
 use crate::variables;
@@ -63,6 +64,8 @@ pub struct EncoderState<S> {
     lost: S,
     pub reading: S,
 }
+
+kept!(EncoderState<f64> as EncoderState { output, counts, lost, reading });
 
 impl<S: Scalar> Encoder<S> {
     /// `turn` is the output travel over which the pulses are counted: 2 pi rad, or 1 m of a `scale`, whose ratio is not that of wheels

@@ -1,6 +1,7 @@
 //! Three Hall sensors, each high over half an electrical turn, with their edges between the six sectors; speed and
 //! count from the edges.
 
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::three;
 use crate::variables;
@@ -48,6 +49,8 @@ pub struct HallState<S> {
     /// Invalid codes and jumps of more than a sector since the start.
     pub errors: S,
 }
+
+kept!(HallState<f64> as HallState { code, valid, last_edge, speed, direction, count, errors });
 
 const PER_TURN: f64 = 1.0 / std::f64::consts::TAU;
 

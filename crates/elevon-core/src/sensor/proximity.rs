@@ -1,6 +1,7 @@
 //! Proximity switches at 0, 25 and 75 % of the stroke, on the lock sleeve and on the wheels' strut, with hysteresis and
 //! response time.
 
+use crate::kept;
 use crate::variables;
 
 variables! {
@@ -32,6 +33,8 @@ pub struct Switches {
     /// What the control unit sees: 0, 25, 75 %, lock sleeve, weight on wheels.
     pub reading: [bool; COUNT],
 }
+
+kept!(Switches as Switches { on, waiting, reading });
 
 pub const COUNT: usize = 5;
 

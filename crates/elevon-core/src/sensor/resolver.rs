@@ -9,7 +9,7 @@
 
 use crate::scalar::Scalar;
 use crate::variable::View;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     /// What a converter reports without power.
@@ -91,6 +91,8 @@ pub struct ResolverState<S> {
     pub angle: S,
     pub speed: S,
 }
+
+kept!(ResolverState<f64> as ResolverState { angle, speed });
 
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<S> {

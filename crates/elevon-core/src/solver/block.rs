@@ -5,8 +5,8 @@ use super::kernels::{Advance, Lift, Observe, Record, Ticking};
 use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
 use crate::actuator::{Inputs, Machine, Setup, Signals, Tick, Wiring, HELD};
-use crate::command::{Source, SourceLanes, SourcePlan};
-use crate::fault::{FaultLanes, FaultSpec};
+use crate::command::{Source, SourceLanes};
+use crate::fault::FaultLanes;
 use crate::noise::Key;
 use crate::scalar::Scalar;
 use crate::time::Steps;
@@ -38,11 +38,11 @@ pub(super) fn feeds<W: Wiring>(index: usize) -> Option<usize> {
 
 /// A port that sets a parameter.
 #[derive(Clone)]
-struct Held {
-    port: usize,
+pub(super) struct Held {
+    pub(super) port: usize,
     index: usize,
     /// Lanes in which waveforms drive it.
-    driven: Vec<bool>,
+    pub(super) driven: Vec<bool>,
 }
 
 fn held<W: Wiring>(runs: &[&RunSpec]) -> Vec<Held> {
@@ -59,31 +59,35 @@ pub struct Block<'a, W: Wiring, S: Scalar, L: Lift<S>> {
     pub(super) real: usize,
     pub(super) lift: L,
     pub(super) clocks: &'a [Clock],
-    structure: W::Structure,
+    pub(super) structure: W::Structure,
     /// The recorded signals.
-    selection: Signals,
+    pub(super) selection: Signals,
     pub(super) dt: f64,
     steps: Steps,
     /// The step that comes next.
     pub(super) k: Steps,
     /// Something was seen to have left its limits, or nothing was looked at so far.
-    trouble: bool,
+    pub(super) trouble: bool,
     /// Parameters were changed from outside.
-    stale: bool,
-    healthy: Vec<Vec<S>>,
+    pub(super) stale: bool,
+    pub(super) healthy: Vec<Vec<S>>,
+    /// Memory for those of a chunk with its faults.
+    raw: Vec<S>,
+    /// Texts of trips are wanted.
+    pub(super) texts: bool,
     pub(super) models: Vec<W::Model<S>>,
     pub(super) states: Vec<W::State<S>>,
     inputs: Vec<Inputs<S>>,
     /// Where numbers carry slopes: ports whose value is a parameter's, and which.
     constants: Vec<(usize, usize)>,
-    sources: Vec<SourceLanes>,
-    held: Vec<Held>,
+    pub(super) sources: Vec<SourceLanes>,
+    pub(super) held: Vec<Held>,
     /// Steps over which those hold their values.
     hold: Steps,
     pub(super) faults: FaultLanes,
-    ticks: Vec<Tick>,
+    pub(super) ticks: Vec<Tick>,
     /// Steps at which each tick and each clock is due next.
-    tick_due: Vec<Steps>,
+    pub(super) tick_due: Vec<Steps>,
     clock_due: Vec<Steps>,
     pub(super) status: Vec<Status>,
     pub(super) stopped: Vec<Option<Steps>>,
@@ -118,6 +122,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             k: 0,
             trouble: true,
             stale: false,
+            raw: Vec::with_capacity(first.parameters.len()),
+            texts: true,
             faults,
             sources: (0..W::PORTS.len()).map(|p| SourceLanes::new(runs.iter().map(|r| r.ports[p].clone()).collect())).collect(),
             held: held::<W>(runs),
@@ -145,18 +151,21 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
             self.sources[held.port].renew(0, self.dt);
         }
         for chunk in 0..self.healthy.len() {
-            let raw = self.parameters_now(chunk);
-            let model = W::derive(&raw, &self.structure);
+            self.take_parameters(chunk);
+            let raw = &self.raw;
+            let model = W::derive(raw, &self.structure);
             let count = W::INITIAL.len();
             let first = chunk * S::LANES;
             let initial: Vec<S> = (0..count).map(|i| S::from_fn(|l| runs[first + l].initial[i])).collect();
-            self.states.push(W::start(&model, &raw, &initial));
+            self.states.push(W::start(&model, raw, &initial));
             self.models.push(model);
         }
     }
 
-    fn parameters_now(&self, chunk: usize) -> Vec<S> {
-        let mut raw = self.healthy[chunk].clone();
+    /// Those of a chunk as they are now, into `raw`.
+    fn take_parameters(&mut self, chunk: usize) {
+        let mut raw = std::mem::take(&mut self.raw);
+        raw.clone_from(&self.healthy[chunk]);
         let first = chunk * S::LANES;
         for held in &self.held {
             let driven = &held.driven[first..first + S::LANES];
@@ -165,8 +174,8 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 raw[held.index] = S::from_fn(|i| if driven[i] { set.lane(i) } else { own.lane(i) });
             }
         }
-        self.faults.apply(chunk * S::LANES, &mut raw, &|lane, fault| self.lift.severity(&self.faults, lane, fault));
-        raw
+        self.faults.apply(chunk * S::LANES, &mut raw, L::SLOPES, &|lane, fault| self.lift.severity(&self.faults, lane, fault));
+        self.raw = raw;
     }
 
     /// Runs to the end or until interrupted.
@@ -229,53 +238,6 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         }
     }
 
-    /// Other equations from the present step on, in which all that runs so far goes on as it is; what is new ticks from the
-    /// next of its own instants on.
-    pub(super) fn widen(&mut self, structure: W::Structure, raw: &[f64], recorded: &[usize]) {
-        let ticks = W::ticks(raw, &structure);
-        let due = |tick: &Tick| {
-            let running = self.ticks.iter().position(|other| other == tick);
-            running.map_or_else(|| tick.first + self.k.saturating_sub(tick.first).next_multiple_of(tick.period), |at| self.tick_due[at])
-        };
-        self.tick_due = ticks.iter().map(due).collect();
-        self.ticks = ticks;
-        let before = std::mem::replace(&mut self.structure, structure);
-        self.selection = Signals::of(recorded);
-        self.stale = true;
-        self.renew(self.k);
-        for (model, state) in self.models.iter().zip(&mut self.states) {
-            W::join(model, &before, &self.structure, state);
-        }
-    }
-
-    /// A lane gets another value of a parameter, which acts from the present step on.
-    pub(super) fn set(&mut self, lane: usize, index: usize, value: f64) {
-        let place = &mut self.healthy[lane / S::LANES][index];
-        let before = *place;
-        *place = S::from_fn(|i| if i == lane % S::LANES { value } else { before.lane(i) });
-        self.stale = true;
-    }
-
-    /// A port of a lane gets another value of its parameter.
-    pub(super) fn feed(&mut self, lane: usize, port: usize, plan: SourcePlan) {
-        self.sources[port].replace(lane, plan);
-    }
-
-    /// A port of a lane gets another sum of waveforms, which acts from the present step on.
-    pub(super) fn drive(&mut self, lane: usize, port: usize, plan: SourcePlan) {
-        self.feed(lane, port, plan);
-        for held in self.held.iter_mut().filter(|held| held.port == port) {
-            held.driven[lane] = true;
-            self.stale = true;
-        }
-    }
-
-    /// A lane gets another fault, which acts from the present step on.
-    pub(super) fn replace_fault(&mut self, lane: usize, fault: usize, spec: FaultSpec) {
-        self.faults.replace(lane, fault, spec);
-        self.stale = true;
-    }
-
     /// Is step `k` an instant of every run of this shape, whatever its inputs and faults: a tick, a sample, a whole stretch
     /// or the end?
     fn shared(&self, k: Steps) -> bool {
@@ -303,26 +265,39 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
         }
         self.stale |= k > 0 && self.held.iter().any(|held| self.sets(held, k));
         if renewed {
-            for chunk in 0..self.inputs.len() {
-                self.inputs[chunk] = self.sources.iter().map(|s| s.pack(chunk * S::LANES)).collect();
-                for held in &self.held {
-                    // No step looks at it.
-                    self.inputs[chunk][held.port] = Source::constant(S::zero());
-                }
-                for &(port, index) in &self.constants {
-                    self.inputs[chunk][port] = Source::constant(self.healthy[chunk][index]);
-                }
-            }
+            self.pack_inputs();
         }
         if self.stale || k > 0 && self.faults.next() <= k {
             self.stale = false;
             self.faults.renew(k, self.dt);
             for chunk in 0..self.models.len() {
-                let raw = self.parameters_now(chunk);
-                self.models[chunk] = W::derive(&raw, &self.structure);
-                W::refresh(&self.models[chunk], &self.structure, &raw, &mut self.states[chunk]);
+                self.derive(chunk);
+                W::refresh(&self.models[chunk], &self.structure, &self.raw, &mut self.states[chunk]);
             }
         }
+    }
+
+    /// The inputs as their sources have them.
+    pub(super) fn pack_inputs(&mut self) {
+        for chunk in 0..self.inputs.len() {
+            self.inputs[chunk].resize_with(self.sources.len(), || Source::constant(S::zero()));
+            for (input, source) in self.inputs[chunk].iter_mut().zip(&self.sources) {
+                *input = source.pack(chunk * S::LANES);
+            }
+            for held in &self.held {
+                // No step looks at it.
+                self.inputs[chunk][held.port] = Source::constant(S::zero());
+            }
+            for &(port, index) in &self.constants {
+                self.inputs[chunk][port] = Source::constant(self.healthy[chunk][index]);
+            }
+        }
+    }
+
+    /// The constants of a chunk from its parameters as they are now.
+    pub(super) fn derive(&mut self, chunk: usize) {
+        self.take_parameters(chunk);
+        W::derive_anew(&mut self.models[chunk], &self.raw, &self.structure);
     }
 
     /// Does a port set its parameter anew at step `k`?

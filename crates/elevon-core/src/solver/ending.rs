@@ -15,10 +15,9 @@ impl<W: Wiring, S: Scalar, L: Lift<S>> Block<'_, W, S, L> {
     pub(super) fn watch(&mut self, k: Steps, out: &mut [S], mark: Mark<Self, W::State<S>>) {
         let time = k as f64 * self.dt;
         for chunk in 0..self.states.len() {
-            let state = self.states[chunk].clone();
             let mut observed = false;
             for lane in chunk * S::LANES..((chunk + 1) * S::LANES).min(self.real) {
-                if self.stopped[lane].is_none() && mark(self, lane, time, &state) {
+                if self.stopped[lane].is_none() && self.marked(lane, time, mark) {
                     if !observed {
                         self.observe(chunk, k, Signals::ALL, out);
                         observed = true;
@@ -27,6 +26,13 @@ impl<W: Wiring, S: Scalar, L: Lift<S>> Block<'_, W, S, L> {
                 }
             }
         }
+    }
+
+    fn marked(&mut self, lane: usize, time: f64, mark: Mark<Self, W::State<S>>) -> bool {
+        let states = std::mem::take(&mut self.states);
+        let marked = mark(self, lane, time, &states[lane / S::LANES]);
+        self.states = states;
+        marked
     }
 
     /// Has the lane left its limits? Not a number is beyond every limit.
@@ -48,7 +54,8 @@ impl<W: Wiring, S: Scalar, L: Lift<S>> Block<'_, W, S, L> {
             return true;
         }
         if self.status[lane] == Status::Ok && W::tripped(state).lane(i) > 0.0 {
-            let reason = W::trip_reason(&self.models[lane / S::LANES], state, i).unwrap_or_default();
+            let text = || W::trip_reason(&self.models[lane / S::LANES], state, i).unwrap_or_default();
+            let reason = if self.texts { text() } else { String::new() };
             self.status[lane] = Status::Tripped { time, reason };
         }
         false

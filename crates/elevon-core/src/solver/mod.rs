@@ -2,8 +2,11 @@
 
 mod batch;
 mod block;
+mod changes;
 mod differentiable;
 mod dual;
+mod embedded;
+mod embedding;
 mod ending;
 mod kernels;
 mod live;
@@ -15,6 +18,7 @@ mod width;
 pub use batch::{run_all, Monitor};
 pub use differentiable::{fault_refusal, force_refusal, parameter_refusal};
 pub use dual::{derivatives, sensitivities};
+pub use embedded::{embedded, Embedded, Standing};
 pub use live::{live, Change, Live, Refusal};
 pub use spec::{Clock, RunOutput, RunSpec, Status};
 pub use width::Width;

@@ -1,7 +1,7 @@
 //! Spring-applied electromagnetic brake on the motor shaft, with the delays of its coil.
 
 use crate::scalar::Scalar;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     /// What powers the coil.
@@ -57,6 +57,8 @@ pub struct Coil {
     pub free: bool,
     waiting: f64,
 }
+
+kept!(Coil as Coil { free, waiting });
 
 /// What the coil is fed with at a tick.
 #[derive(Clone, Copy, Debug)]

@@ -2,6 +2,7 @@
 //! ASSUMED: viscosity by Reynolds' exponential law, the load-independent friction of a rolling contact with its power 2/3
 //! (Palmgren), dry friction and efficiency losses growing linearly with cold.
 
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::variable::View;
 use crate::variables;
@@ -38,6 +39,8 @@ pub struct Lubricant<S> {
     /// On 1/eta - 1.
     pub loss: S,
 }
+
+kept!(Lubricant<f64> as Lubricant { viscous, dry, loss });
 
 impl<S: Scalar> Grease<S> {
     pub fn derive(raw: &[S]) -> Self {

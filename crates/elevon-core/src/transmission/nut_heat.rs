@@ -2,6 +2,7 @@
 //!
 //! One node on the tick of the motor's network: C dT/dt = P - (T - T_a)/R, backward Euler with the mean heat of the tick.
 
+use crate::kept;
 use crate::scalar::Scalar;
 
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +25,8 @@ pub struct NutState<S> {
     /// Mean of the last tick, W.
     pub power: S,
 }
+
+kept!(NutState<f64> as NutState { temperature, collected, power });
 
 impl<S: Scalar> NutHeat<S> {
     /// Heat capacity J/K, resistance to the air K/W, share of the loss, the air's temperature and the tick, s.

@@ -3,7 +3,7 @@
 
 use crate::scalar::Scalar;
 use crate::variable::View;
-use crate::{choices, variables};
+use crate::{choices, kept, variables};
 
 choices! {
     /// How the housing answers.
@@ -41,6 +41,8 @@ pub struct VibrationState<S> {
     pub speed: S,
     pub acceleration: S,
 }
+
+kept!(VibrationState<f64> as VibrationState { displacement, speed, acceleration });
 
 impl<S: Scalar> VibrationState<S> {
     pub fn initial() -> Self {

@@ -10,6 +10,7 @@ use crate::control::sequence::COMMANDS;
 use crate::inverter::bridge::{BridgeStructure, InverterParameter as Inverter};
 use crate::inverter::six_step::{Chopping, SixStep, SixStepParameter};
 use crate::inverter::supply::{Link, Supply};
+use crate::kept;
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, Star};
 use crate::scalar::Scalar;
 use crate::sensor::hall::{Hall, HallState};
@@ -71,7 +72,7 @@ pub struct Constants<S> {
     /// 1 while the release's cable pulls.
     cable: S,
     /// Parameters of each lane as plain numbers, for the control unit.
-    raw: Vec<Vec<f64>>,
+    pub raw: Vec<Vec<f64>>,
 }
 
 /// All that changes during a run, except the currents.
@@ -99,6 +100,11 @@ pub struct Body<S> {
     pub energy: [S; 5],
 }
 
+kept!(Body<f64> as Body {
+    motion, hall, units, demand, driving, short, brake_free, released, link, flow, bus, charge, line, line_reading, cell_noise, lock_use,
+    energy
+});
+
 pub const E_SUPPLY: usize = 0;
 pub const E_SOURCE: usize = 1;
 pub const E_DUMP: usize = 2;
@@ -106,7 +112,12 @@ pub const E_COPPER: usize = 3;
 pub const E_INVERTER: usize = 4;
 
 impl<S: Scalar> Constants<S> {
-    pub fn derive(raw: &[S], structure: &Structure, dt: S, mechanical: S) -> Self {
+    pub fn derive(raw: &[S], structure: &Structure, mut plain: Vec<Vec<f64>>, dt: S, mechanical: S) -> Self {
+        plain.resize_with(S::LANES, Vec::new);
+        for (lane, numbers) in plain.iter_mut().enumerate() {
+            numbers.clear();
+            numbers.extend(raw.iter().map(|x| x.lane(lane)));
+        }
         let view = Raw(raw);
         let at = |i: usize| raw[i];
         let rise = at(MotorParameter::WindingTemperature.at()) - at(MotorParameter::ReferenceTemperature.at());
@@ -127,7 +138,7 @@ impl<S: Scalar> Constants<S> {
             per_control_period: S::one() / at(PiRateParameter::Period.at()),
             cell_noise: at(CellParameter::LoadCellNoise.at()),
             cable: S::one() - S::indicator(S::splat(0.5).le(at(ReleaseParameter::CableFailed.at()))),
-            raw: (0..S::LANES).map(|lane| raw.iter().map(|x| x.lane(lane)).collect()).collect(),
+            raw: plain,
         }
     }
 

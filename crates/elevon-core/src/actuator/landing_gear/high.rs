@@ -6,8 +6,10 @@ use super::signals::{Quantity as Q, ALL};
 use super::LandingGear;
 use crate::actuator::{Finding, Inputs, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::pi_rate::PiRateParameter;
-use crate::inverter::bridge::{extinguish, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings};
+use crate::inverter::bridge::{extinguish, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings, INVERTER};
 use crate::inverter::six_step::{self, SixStepParameter};
+use crate::kept;
+use crate::kept::{Kept, Store};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
@@ -37,6 +39,8 @@ pub struct State<S> {
     torque: S,
     voltage: [S; 3],
 }
+
+kept!(State<f64> as State { body, current, legs, bridge, cut, torque, voltage });
 
 /// A part of an electrical step with the legs as they are.
 #[derive(Clone, Copy)]
@@ -173,13 +177,26 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
 }
 
 /// The bridge's parameters; shorted terminals are what three lower switches shorted together are.
-fn terminals<S: Scalar>(raw: &[S]) -> Vec<S> {
-    let mut inverter = Raw(raw).inverter().to_vec();
+fn terminals<S: Scalar>(raw: &[S]) -> [S; INVERTER.len()] {
+    let mut inverter = [S::zero(); INVERTER.len()];
+    inverter.copy_from_slice(Raw(raw).inverter());
     let shorted = S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()]));
     for low in [InverterParameter::ShortedALow, InverterParameter::ShortedBLow, InverterParameter::ShortedCLow] {
         inverter[low as usize] = inverter[low as usize].maximum(shorted);
     }
     inverter
+}
+
+/// `plain` is memory for the parameters as plain numbers.
+fn derive<S: Scalar>(raw: &[S], structure: &Structure, plain: Vec<Vec<f64>>) -> Model<S> {
+    let dt = raw[SolverParameter::Step.at()];
+    let mechanical = raw[SolverParameter::MechanicalStep.at()];
+    Model {
+        c: Constants::derive(raw, structure, plain, dt, mechanical),
+        bridge: Bridge::derive(&terminals(raw)),
+        per_torque_steps: S::one() / mechanical,
+        mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
+    }
 }
 
 impl Wiring for High {
@@ -210,14 +227,14 @@ impl Wiring for High {
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
-        let dt = raw[SolverParameter::Step.at()];
-        let mechanical = raw[SolverParameter::MechanicalStep.at()];
-        Model {
-            c: Constants::derive(raw, structure, dt, mechanical),
-            bridge: Bridge::derive(&terminals(raw)),
-            per_torque_steps: S::one() / mechanical,
-            mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
-        }
+        derive(raw, structure, Vec::new())
+    }
+    fn derive_anew<S: Scalar>(model: &mut Model<S>, raw: &[S], structure: &Structure) {
+        let plain = std::mem::take(&mut model.c.raw);
+        *model = derive(raw, structure, plain);
+    }
+    fn keep(state: &mut State<f64>, store: &mut Store) {
+        state.keep(store);
     }
 
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {

@@ -3,6 +3,7 @@
 use super::layout::Raw;
 use crate::control::pi_rate::{PiRate, PiRateParameter};
 use crate::control::sequence::{BrakeReading, Note, Orders, Phase, Places, Seen, Sequence, SequenceParameter, COMMANDS};
+use crate::kept;
 use crate::sensor::proximity::{ProximityParameter, Scene, Switches};
 use crate::transmission::brake::{BrakeParameter, Coil, Feed, Powered};
 use crate::transmission::lever::LeverParameter;
@@ -29,6 +30,10 @@ pub struct Unit {
     dead: f64,
     starting: f64,
 }
+
+kept!(Unit as Unit {
+    sequence, speed, switches, coil, demand, driving, short, speed_meas, current, line, hall_errors, hanging, reported, dead, starting
+});
 
 /// The plant's signals that the unit reads at a tick.
 #[derive(Clone, Copy, Debug)]

@@ -5,6 +5,7 @@ use super::layout::*;
 use super::shaft::ShaftState;
 use crate::control::position_speed::{ControlParameter, Feedback};
 use crate::details;
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::sensor::encoder::{Encoder, EncoderState};
 use crate::sensor::resolver::{Reading, Resolver, ResolverState};
@@ -58,6 +59,8 @@ pub struct Sensed<S> {
     pub noise: [S; 2],
     encoder: EncoderState<S>,
 }
+
+kept!(Sensed<f64> as Sensed { resolver, noise, encoder });
 
 impl<S: Scalar> Sensing<S> {
     pub(super) fn derive(raw: &[S], d: &SensingDetails) -> Self {

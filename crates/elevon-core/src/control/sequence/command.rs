@@ -2,6 +2,8 @@
 
 use super::codes::*;
 use super::{Phase, Seen, Sequence, SequenceParameter as P};
+use crate::kept;
+use crate::kept::{Kept, Store};
 
 /// Something that did not go as it was commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +33,36 @@ pub enum Note {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Notes {
     list: [Option<Note>; 6],
+}
+
+kept!(Notes as Notes { list });
+
+impl Default for Note {
+    fn default() -> Self {
+        Self::Hanging { time: 0.0, place: 0.0 }
+    }
+}
+
+impl Kept for Note {
+    /// Kind, time, three codes, a value: those that a kind lacks are zero.
+    fn keep(&mut self, store: &mut Store) {
+        let (mut kind, mut time, mut codes, mut value) = match *self {
+            Self::Refused { time, command, reason, value } => (0_u8, time, [command, reason, 0], value),
+            Self::Failed { time, fault, command, warning } => (1, time, [fault, command, warning], 0.0),
+            Self::Hanging { time, place } => (2, time, [0; 3], place),
+        };
+        kind.keep(store);
+        time.keep(store);
+        codes.keep(store);
+        value.keep(store);
+        let [first, second, third] = codes;
+        *self = match kind {
+            0 => Self::Refused { time, command: first, reason: second, value },
+            1 => Self::Failed { time, fault: first, command: second, warning: third },
+            2 => Self::Hanging { time, place: value },
+            _ => return store.refuse(),
+        };
+    }
 }
 
 impl Notes {

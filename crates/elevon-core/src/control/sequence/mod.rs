@@ -14,7 +14,8 @@ pub use command::Note;
 pub use position::Places;
 pub use readings::{SWITCHES, WHEELS};
 
-use crate::{choices, variables};
+use crate::kept::{keep_choice, Kept, Store};
+use crate::{choices, kept, variables};
 use codes::{FREE_FALL, POWER, STOP};
 use command::Notes;
 use position::{Margins, Position};
@@ -88,8 +89,9 @@ pub enum Phase {
     Off,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Move {
+    #[default]
     Idle,
     Extend,
     Retract,
@@ -100,6 +102,20 @@ enum Move {
     Reseat,
     /// Press against the stop of the end that a switch shows, at power-up.
     Confirm,
+}
+
+impl Kept for Phase {
+    fn keep(&mut self, store: &mut Store) {
+        use Phase::*;
+        keep_choice(self, &[Retracted, Extending, Locked, Retracting, Stopped, Released, Fault, Unconfirmed, Off], store);
+    }
+}
+
+impl Kept for Move {
+    fn keep(&mut self, store: &mut Store) {
+        use Move::*;
+        keep_choice(self, &[Idle, Extend, Retract, Halt, BackOff, Reseat, Confirm], store);
+    }
 }
 
 /// What the control unit sees at a tick.
@@ -201,6 +217,13 @@ pub struct Sequence {
     pub warning: u8,
     pub notes: Notes,
 }
+
+kept!(Sequence as Sequence {
+    phase, action, following, wanted, last, released, releasing, falling, closed, since, powered, pause, retries, standing, pressing,
+    slow, resting, arrived, anchor, gone, furthest, dragging, impossible, starved, hall_seen, hall_begun, hall_invalid, hall_times,
+    cleared, extending, brake_open, fresh, distrusted, doubt, grounded, pressed, places, position, readings, fault, refused, warning,
+    notes
+});
 
 impl Sequence {
     /// At power-up. An end that one switch shows is not yet known.

@@ -1,6 +1,7 @@
 //! Where the nut is: an interval that the Hall count moves, and the switches in mid-stroke and the stops narrow.
 
 use super::readings::{P0, P100, SWITCHES};
+use crate::kept;
 
 /// Where the switches stand and what the lock needs, as the unit knows them (nut travel, m).
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +16,8 @@ pub struct Places {
     pub end: f64,
 }
 
+kept!(Places as Places { switch, hysteresis, stroke, engage, release, end });
+
 #[derive(Clone, Copy, Debug)]
 pub struct Position {
     pub low: f64,
@@ -23,6 +26,8 @@ pub struct Position {
     edgeless: (f64, f64),
     counted: f64,
 }
+
+kept!(Position as Position { low, high, edgeless, counted });
 
 /// How far the count and a switch may differ before the switch is at fault: at the ends, and at 25 and 75 %.
 #[derive(Clone, Copy, Debug)]

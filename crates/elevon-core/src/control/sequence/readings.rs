@@ -1,6 +1,7 @@
 //! What the unit makes of its switches: debounced, watched for chatter, and with the travel over which each has stood.
 
 use super::position::{Places, Position};
+use crate::kept;
 
 /// At 0, 25, 75 %, on the lock sleeve, and the weight on wheels.
 pub const SWITCHES: usize = 5;
@@ -45,6 +46,8 @@ pub struct Readings {
     most: [f64; 4],
     lost: f64,
 }
+
+kept!(Readings as Readings { on, stood, failed, misplaced, back, changed, raw, waiting, changes, begun, least, most, lost });
 
 impl Readings {
     pub fn start(on: [bool; SWITCHES], counted: f64) -> Self {

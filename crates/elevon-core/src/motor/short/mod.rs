@@ -16,12 +16,14 @@
 //! couples the branches. So any resistance runs at any step: without limit it is the healthy motor, at zero the dead short.
 //! Contacts that share a phase see each other through the terminals only.
 
+mod discrete;
 mod network;
 mod parameters;
 #[cfg(test)]
 mod tests;
 
-pub use network::{Account, Discrete, Network};
+pub use discrete::Discrete;
+pub use network::{Account, Network};
 pub use parameters::{ShortParameter, TapParameter, SHORT, TAP};
 
 use super::star::{MotorParameter, ShortModel, Star};

@@ -4,6 +4,7 @@
 use super::pair::Pair;
 use super::{Model, State};
 use crate::inverter::six_step::{self, Chopping};
+use crate::kept;
 use crate::scalar::Scalar;
 use crate::three;
 
@@ -16,6 +17,8 @@ pub(super) struct Handover<S> {
     pub(super) demand: [S; 3],
     pub(super) change: [S; 3],
 }
+
+kept!(Handover<f64> as Handover { outgoing, demand, change });
 
 /// Current that the phase which left the pair still carries, its mean over the step (docs/theory/landing-gear.md, "The
 /// outgoing phase"): L do/dt = -(v + (e - 2 h)/3) with the pair's EMF e, that of the incoming phase less that of the

@@ -16,6 +16,8 @@ use crate::actuator::{Finding, Inputs, Setup, Signals, Tick, Watch, Wiring, WATC
 use crate::control::pi_rate::PiRateParameter;
 use crate::inverter::bridge::InverterParameter;
 use crate::inverter::six_step::{self, Chopping, SixStepParameter};
+use crate::kept;
+use crate::kept::{Kept, Store};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
@@ -48,6 +50,8 @@ pub struct State<S> {
     tripped: S,
     handover: Handover<S>,
 }
+
+kept!(State<f64> as State { body, current, line, torque, tripped, handover });
 
 #[inline(always)]
 fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, k: Steps) {
@@ -120,6 +124,20 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     hand_over(s);
 }
 
+/// `plain` is memory for the parameters as plain numbers.
+fn derive<S: Scalar>(raw: &[S], structure: &Structure, plain: Vec<Vec<f64>>) -> Model<S> {
+    let dt = raw[LowParameter::Step.at()];
+    let c = Constants::derive(raw, structure, plain, dt, dt);
+    Model {
+        on_resistance: raw[InverterParameter::OnResistance.at()],
+        diode_drop: raw[InverterParameter::DiodeDrop.at()],
+        inductance: three!(|j| S::one() / c.star.per_inductance[j]),
+        commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
+        terminals: S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()])),
+        c,
+    }
+}
+
 impl Wiring for Low {
     type Structure = Structure;
     type Model<S: Scalar> = Model<S>;
@@ -148,16 +166,14 @@ impl Wiring for Low {
     }
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
-        let dt = raw[LowParameter::Step.at()];
-        let c = Constants::derive(raw, structure, dt, dt);
-        Model {
-            on_resistance: raw[InverterParameter::OnResistance.at()],
-            diode_drop: raw[InverterParameter::DiodeDrop.at()],
-            inductance: three!(|j| S::one() / c.star.per_inductance[j]),
-            commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
-            terminals: S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()])),
-            c,
-        }
+        derive(raw, structure, Vec::new())
+    }
+    fn derive_anew<S: Scalar>(model: &mut Model<S>, raw: &[S], structure: &Structure) {
+        let plain = std::mem::take(&mut model.c.raw);
+        *model = derive(raw, structure, plain);
+    }
+    fn keep(state: &mut State<f64>, store: &mut Store) {
+        state.keep(store);
     }
 
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {

@@ -5,6 +5,7 @@ mod apart;
 mod rig;
 
 use super::layout::*;
+use crate::kept;
 use crate::motor::star::MotorParameter;
 use crate::piecewise::{Curve, Knots};
 use crate::scalar::Scalar;
@@ -65,6 +66,8 @@ pub struct Motion<S> {
     pub fastest: S,
     pub energy: [S; ACCOUNTS],
 }
+
+kept!(Motion<f64> as Motion { motor_position, motor_speed, nut_position, nut_speed, carrying, locked, rig_force, fastest, energy });
 
 /// What acts during a step.
 #[derive(Clone, Copy, Debug)]

@@ -21,6 +21,7 @@ use crate::actuator::servo::details::{Needs, Structure};
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::{Finding, Inputs, Overheat, Setup, Signals, Tick, Watch, Wiring, WATCHED};
+use crate::kept::{Kept, Store};
 use crate::scalar::{apart, Scalar};
 use crate::time::Steps;
 use crate::variable::Signal;
@@ -71,6 +72,9 @@ impl<F: Form> Wiring for High<F> {
         if after.measured_current && !before.measured_current {
             (state.current_reading, state.extra.sensed) = (state.star.current, state.star.current);
         }
+    }
+    fn keep(state: &mut State<f64>, store: &mut Store) {
+        state.keep(store);
     }
     fn refuses_start(raw: &[f64], initial: &[f64]) -> Option<String> {
         crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]])

@@ -11,6 +11,7 @@ use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
 use crate::inverter::carrier::{Carrier, Window};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::inverter::losses::{DriveHeat, DriveHeatState, SwitchingParameter};
+use crate::kept;
 use crate::motor::pole::WeakPole;
 use crate::motor::short::{Discrete, Shorts};
 use crate::motor::star::{MotorParameter, Star, StarState};
@@ -83,6 +84,11 @@ pub struct State<S> {
     pub(crate) extra: ExtraState<S>,
 }
 
+kept!(State<f64> as State {
+    star, middle, legs, window, commands, bridge, control, current_ref, current_control, shaft, command_noise, current_noise, sensed,
+    current_reading, filtered, transitions, voltage, energy, extra
+});
+
 /// State of what only some servos have.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ExtraState<S> {
@@ -96,6 +102,8 @@ pub(crate) struct ExtraState<S> {
     /// The contacts' network at the present parameters and temperature.
     pub contacts: Discrete<S>,
 }
+
+kept!(ExtraState<f64> as ExtraState { network, sensed, last_reference, link, drive_heat, contacts });
 
 /// Accounts of the electrical part; those of the shaft are its own.
 pub(crate) const E_SUPPLY: usize = 0;

@@ -8,6 +8,7 @@ use super::passive::{parts, per_winding};
 use super::phase::{coefficients, Phase};
 use super::relays::{aligned, Relays};
 use crate::actuator::servo::layout::DriveKind;
+use crate::kept;
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
@@ -21,6 +22,8 @@ pub struct DrivenState<S> {
     pub(super) legs: [S; 3],
     integral: [S; 2],
 }
+
+kept!(DrivenState<f64> as DrivenState { legs, integral });
 
 impl<S: Scalar> DrivenState<S> {
     pub(super) fn initial() -> Self {

@@ -8,6 +8,7 @@
 
 use crate::actuator::servo::layout::*;
 use crate::control::position_speed::ControlParameter;
+use crate::kept;
 use crate::scalar::Scalar;
 
 /// What a step's slope may demand, of the torque limit, before a change counts as a jump.
@@ -41,6 +42,8 @@ pub struct JumpState<S> {
     pub(super) reading: S,
     pub(super) motion: S,
 }
+
+kept!(JumpState<f64> as JumpState { change, level, reference, reading, motion });
 
 /// Mean torque over a step, and what the torque's limit cuts off, N m s.
 pub(super) struct Kick<S> {

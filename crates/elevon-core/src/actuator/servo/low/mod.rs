@@ -20,6 +20,7 @@ use super::form::Form;
 use super::layout::*;
 use crate::actuator::{Finding, Inputs, Overheat, Setup, Signals, Tick, Watch, Wiring, WATCHED};
 use crate::control::position_speed::ControlParameter;
+use crate::kept::{Kept, Store};
 use crate::motor::equivalent::LowParameter;
 use crate::motor::thermal::ThermalParameter;
 use crate::scalar::{apart, Scalar};
@@ -89,6 +90,9 @@ impl<F: Form> Wiring for Low<F> {
 
     fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
         Model::derive::<F>(raw, structure)
+    }
+    fn keep(state: &mut State<f64>, store: &mut Store) {
+        state.keep(store);
     }
     fn refuses_start(raw: &[f64], initial: &[f64]) -> Option<String> {
         crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]])

@@ -15,6 +15,7 @@ use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::{Bridge, BridgeState, BridgeStructure, InverterParameter};
 use crate::inverter::link::{DcLink, DcLinkState};
+use crate::kept;
 use crate::motor::equivalent::{Circuit, LowParameter};
 use crate::motor::pole::WeakPole;
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, ShortModel, Star, StarState};
@@ -181,6 +182,12 @@ pub struct State<S> {
     pub tripped: S,
     pub shaft: ShaftState<S>,
 }
+
+kept!(State<f64> as State {
+    link, resistance_factor, flux_factor, network, command, copper, current, current_q, current_seen, phases, loops, bridge, driven,
+    command_noise, jumps, rested, voltage, integral, filtered_error, speed_ref, torque_ref, motor_torque, sensed, filtered, tripped,
+    shaft
+});
 
 impl<S: Scalar> Drive<S> {
     /// Between what one current and what three windings make.

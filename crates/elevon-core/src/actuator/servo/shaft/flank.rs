@@ -4,6 +4,7 @@
 use super::loads::Loads;
 use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
+use crate::kept;
 use crate::scalar::Scalar;
 
 /// Keeps a massless, undamped output's speed a number.
@@ -21,6 +22,8 @@ pub struct Flank<S> {
     /// 1 once a force or friction has acted on the output; before, the output stays where the motor left it.
     acting: S,
 }
+
+kept!(Flank<f64> as Flank { side, pressed, acting });
 
 /// Output after a step by itself.
 struct Free<S> {

@@ -17,6 +17,7 @@ use super::form::Form;
 use super::high::model::network_period;
 use super::layout::*;
 use crate::details;
+use crate::kept;
 use crate::motor::cogging::Cogging;
 use crate::motor::star::MotorParameter;
 use crate::motor::thermal::Network;
@@ -166,6 +167,11 @@ pub struct ShaftState<S> {
     pub work: Work<S>,
 }
 
+kept!(ShaftState<f64> as ShaftState {
+    motor_position, motor_speed, output_position, output_speed, jam_side, jammed, scatter, fastest, bristle, lubricant, nut, vibration,
+    flank, work
+});
+
 /// Work done against each load since the start, J.
 #[derive(Clone, Copy, Debug)]
 pub struct Work<S> {
@@ -175,6 +181,8 @@ pub struct Work<S> {
     /// Lost at the stops and in the contact.
     pub impact: S,
 }
+
+kept!(Work<f64> as Work { friction, brake, load, impact });
 
 impl<S: Scalar> Shaft<S> {
     pub(super) fn derive<F: Form>(raw: &[S], d: &ShaftDetails, dt: S) -> Self {
