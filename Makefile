@@ -21,10 +21,13 @@ OVERLAY := $(CURDIR)/$(STAMPS)/physics
 CHECK   ?= tests/physics
 
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+# The binary of FMUs, from the core that the extension has compiled: a link and the interface itself.
+CAPI := $(BIN)/python tools/capi.py
+
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo check test test-rust test-python test-long lint size stubs docs wheel bench format lock audit licences clean
+.PHONY: help setup capi demo check test test-rust test-python test-long lint size stubs docs wheel bench format lock audit licences clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -42,7 +45,14 @@ $(STAMPS)/packages: requirements.lock | $(BIN)/python
 
 $(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --locked
+	$(CAPI)
 	@touch $@
+
+capi: $(STAMPS)/packages ## the C interface: target/release/libelevon.a and .so, the header, the binary of FMUs
+	$(CAPI)
+	@if command -v cbindgen >/dev/null; then \
+		cbindgen --quiet --config crates/elevon-capi/cbindgen.toml crates/elevon-capi/src/c.rs \
+			--output crates/elevon-capi/include/elevon.h; fi
 
 demo: setup ## a unit's life, its diagnoses, its predicted end: out/demo/report.html
 	$(DEMO)
@@ -87,6 +97,7 @@ docs: setup $(STAMPS)/docs ## the documentation site, its links followed: out/do
 	$(BIN)/python tools/pages/build.py
 
 wheel: $(STAMPS)/packages ## the wheel for this system in dist/, checked where there is no compiler
+	$(CAPI)
 	$(BIN)/maturin build --release --quiet --locked --out dist
 	$(BIN)/python tools/check_wheel.py dist
 

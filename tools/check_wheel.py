@@ -56,6 +56,7 @@ def main(folder: str) -> int:
         run(elevon, "list", "actuators")
         run(elevon, "show", "torino-rotary")
         run(elevon, "simulate", "torino-rotary", "--duration", "0.2", "--out", "run.csv")
+        run(elevon, "export", "fmu", "torino-rotary", "-o", "a.fmu")
         run(elevon, "bench", "run", "stall", "--actuator", "torino-rotary", "--out", "bench")
         run(python, "-c", SESSION)
         output = run(
@@ -71,7 +72,7 @@ def main(folder: str) -> int:
         if "elevon[files]" not in output:
             raise SystemExit(f"a command without its extra does not name it: {output}")
     print(
-        "simulate, list, show, bench, sessions and CSV work without extras and without a compiler"
+        "simulate, list, show, export, bench, sessions and CSV work without extras and a compiler"
     )
     return 0
 

@@ -30,6 +30,7 @@ OPTIONAL = {
 #: What packages call their licence who do not name it by its SPDX identifier.
 _NAMES = {
     "mit license": "MIT", "mit": "MIT", "bsd license": "BSD-3-Clause", "bsd": "BSD-3-Clause",
+    "standard 2-clause bsd": "BSD-2-Clause",
     "apache software license": "Apache-2.0", "apache 2.0": "Apache-2.0",
     "isc license (iscl)": "ISC", "isc license": "ISC",
     "python software foundation license": "PSF-2.0",

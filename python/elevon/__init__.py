@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from elevon.calibrate.door import calibrate as calibrate
     from elevon.calibrate.door import validate as validate
     from elevon.campaign import load_campaign as load_campaign
+    from elevon.deploy import export_fmu as export_fmu
     from elevon.diagnose.door import diagnose as diagnose
     from elevon.diagnose.door import monitor as monitor
     from elevon.doors import bench as bench
@@ -51,6 +52,7 @@ _PUBLIC = {
     "compare": "elevon.doors",
     "diagnose": "elevon.diagnose.door",
     "effects": "elevon.doors",
+    "export_fmu": "elevon.deploy",
     "fleet": "elevon.prognose.door",
     "monitor": "elevon.diagnose.door",
     "next_test": "elevon.nexttest.door",

@@ -24,7 +24,7 @@ ROWS = [
     ["logs"],
     ["simulate"],
     ["experiment"],
-    ["bench", "campaign", "calibrate", "compare", "session"],
+    ["bench", "campaign", "calibrate", "compare", "session", "deploy"],
     ["lowfit", "analysis", "benchmark", "compare_loads", "response", "environment"],
     ["diagnose"],
     ["nexttest", "training"],

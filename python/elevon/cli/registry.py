@@ -36,6 +36,7 @@ _HELP = {
     "bench": "Run the virtual test bench's procedures.",
     "design": "Design experiments and parts.",
     "loads": "Turn a recorded flight into an actuator's load.",
+    "export": "Write an actuator for other tools: FMUs, the C interface.",
     "import": "Read bench and drive logs into recordings.",
     "features": "Compute features of a recording or a log.",
     "calibrate": "Fit an actuator's parameters to logs.",

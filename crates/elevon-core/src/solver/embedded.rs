@@ -69,6 +69,9 @@ impl<W: Wiring> Single<W> {
         for &port in W::Machine::LATE_PORTS {
             run.driven[port] = true;
         }
+        for port in 0..run.driven.len() {
+            drive_where_equal::<W>(&mut run, port, recorded);
+        }
         let ports: Vec<f64> = run.ports.iter().map(|plan| plan.value(0, 1.0)).collect();
         run.ports = ports.iter().map(|&value| SourcePlan::constant(value)).collect();
         let (parameters, signals) = (run.parameters.len(), W::signals().len());
@@ -116,6 +119,13 @@ impl<W: Wiring> Single<W> {
             self.reform();
         }
     }
+}
+
+/// Counts a port as driven where that needs no other equations: the first value that is set then takes no memory.
+fn drive_where_equal<W: Wiring>(run: &mut RunSpec, port: usize, recorded: &[usize]) {
+    let (before, driven) = (structure::<W>(run, recorded), run.driven[port]);
+    run.driven[port] = true;
+    run.driven[port] = driven || structure::<W>(run, recorded) == before;
 }
 
 /// The places that are marked, in memory that is there.
