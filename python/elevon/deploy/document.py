@@ -67,7 +67,7 @@ class RunDocument:
     step: float
 
     def contents(self, announced: Iterable[str] = ()) -> dict[str, Any]:
-        """Return what is written; the equations hold `announced` faults (``KIND@PLACE``) at once."""
+        """Return what is written; `announced` faults (``KIND@PLACE``) are held from the start."""
         names = [f"{port.record.kind}@{port.place}" for port in self.faults]
         wanted = list(announced)
         for name in wanted:
