@@ -118,8 +118,8 @@ def _units(root: Element, variables: Sequence[FmuVariable]) -> None:
         entry = SubElement(listed, "Unit", name=text)
         SubElement(entry, "BaseUnit", base)
         for name, factor, offset in DISPLAYS.get(text, ()):
-            shown = {"name": name, "factor": repr(factor), "offset": repr(offset)}
-            SubElement(entry, "DisplayUnit", shown)
+            display = {"name": name, "factor": repr(factor), "offset": repr(offset)}
+            SubElement(entry, "DisplayUnit", display)
 
 
 def _choices(root: Element, variables: Sequence[FmuVariable], version: str) -> None:
