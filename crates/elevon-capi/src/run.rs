@@ -3,7 +3,7 @@
 use crate::spec::{digest, Spec};
 use crate::text::Text;
 use elevon_core::actuator::Severity;
-use elevon_core::fault::{make_whole, FaultSpec};
+use elevon_core::fault::{make_whole, FaultKind, FaultSpec};
 use elevon_core::kept::{Kept, Store};
 use elevon_core::registry::Model;
 use elevon_core::solver::{Embedded, Standing};
@@ -82,7 +82,7 @@ impl Run {
             inputs: ports.clone().map(|port| spec.inputs[port].unwrap_or_else(|| spec.fallback(port))).collect(),
             severities: resolved.faults.iter().map(|fault| fault.severity).collect(),
             faults: resolved.faults.clone(),
-            fault_ranges: spec.faults.iter().map(|fault| range_of(model, &fault.kind, &fault.place)).collect(),
+            fault_ranges: fault_ranges(spec),
             port_ranges: ports.map(|port| port_range(spec, port)).collect(),
             exclusive: spec.exclusive.clone(),
             healthy: resolved.parameters.clone(),
@@ -347,9 +347,11 @@ fn in_range(parameters: &[f64], ranges: impl Iterator<Item = Range>, path: impl 
     }
 }
 
-fn range_of(model: Model, kind: &str, place: &str) -> Range {
-    let carries = |f: &&elevon_core::fault::FaultKind| f.kind == kind && f.places.iter().any(|p| p.name == place);
-    model.faults().iter().find(carries).map_or(Range::Any, |f| f.range)
+fn fault_ranges(spec: &Spec) -> Vec<Range> {
+    let known = spec.model.faults();
+    let carries = |f: &FaultKind, kind: &str, place: &str| f.kind == kind && f.places.iter().any(|p| p.name == place);
+    let range = |kind: &str, place: &str| known.iter().find(|f| carries(f, kind, place)).map_or(Range::Any, |f| f.range);
+    spec.faults.iter().map(|fault| range(&fault.kind, &fault.place)).collect()
 }
 
 /// Range of the parameter that a port sets.

@@ -2,10 +2,12 @@
 
 use crate::json::Json;
 use elevon_core::command::SourcePlan;
-use elevon_core::fault::{FaultSpec, Named, Profile};
+use elevon_core::fault::{FaultKind, FaultSpec, Named, Profile};
 use elevon_core::registry::Model;
 use elevon_core::solver::RunSpec;
 use elevon_core::variable::Range;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// The form of the document that is read here.
 const SCHEMA: f64 = 1.0;
@@ -72,6 +74,8 @@ pub struct Spec {
     pub variables: Vec<Variable>,
     /// Of the document, whatever has been set since: states are exchanged among instances of one.
     pub identity: u64,
+    /// Places of the parameters by their paths: made once, for writing out the paths takes as long as a short run.
+    places: Arc<HashMap<String, usize>>,
 }
 
 type Read<T> = Result<T, String>;
@@ -158,6 +162,7 @@ impl Spec {
             prepared: 0,
             variables: Vec::new(),
             identity: digest(document.as_bytes()),
+            places: Arc::new(places(model)),
         };
         for (port, value) in numbers(need(&json, "inputs")?, "inputs", |name| model.ports().iter().position(|p| p.name == name))? {
             spec.inputs[port] = Some(value);
@@ -210,8 +215,7 @@ impl Spec {
 
     /// Place of a parameter by its path.
     pub fn index(&self, path: &str) -> Option<usize> {
-        let groups = self.model.groups();
-        groups.iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i))).position(|p| p == path)
+        self.places.get(path).copied()
     }
 
     /// Path of the parameter in a place.
@@ -240,7 +244,8 @@ impl Spec {
         if self.parameters.len() != expected {
             return Err(format!("{} parameters given, {expected} expected", self.parameters.len()));
         }
-        let faults = self.faults.iter().map(|fault| self.fault(fault)).collect::<Read<Vec<_>>>()?;
+        let known = self.model.faults();
+        let faults = self.faults.iter().map(|fault| self.fault(&known, fault)).collect::<Read<Vec<_>>>()?;
         let prepared = |at: usize| self.prepared == 1 || self.prepared == at as u64 + 2;
         let announced = (0..faults.len()).filter(|&at| self.faults[at].announced || prepared(at));
         let mut tunable: Vec<usize> = announced.flat_map(|at| faults[at].writes.iter().map(|w| w.index)).collect();
@@ -263,11 +268,16 @@ impl Spec {
         })
     }
 
-    fn fault(&self, entry: &FaultEntry) -> Read<FaultSpec> {
+    fn fault(&self, known: &[FaultKind], entry: &FaultEntry) -> Read<FaultSpec> {
         let attribute = |name: &str| entry.attributes.iter().find(|(other, _)| other == name).map(|(_, value)| *value);
         let named = Named { kind: &entry.kind, place: &entry.place, severity: entry.severity, attribute: &attribute };
-        named.resolved(&self.model.faults(), &|path| self.index(path), Profile::Constant)
+        named.resolved(known, &|path| self.index(path), Profile::Constant)
     }
+}
+
+fn places(model: Model) -> HashMap<String, usize> {
+    let paths = model.groups().iter().flat_map(|g| (0..g.variables.len()).map(|i| g.path(i)));
+    paths.enumerate().map(|(index, path)| (path, index)).collect()
 }
 
 fn fault(json: &Json) -> Read<FaultEntry> {
