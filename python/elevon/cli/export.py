@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from elevon.cli import completion
-from elevon.cli.common import ActuatorArgument, FidelityOption, ForceOption, JsonOption
+from elevon.cli.common import ActuatorArgument, FidelityOption, ForceOption
 from elevon.cli.groups import NamingGroup
-from elevon.cli.output import answer, print_json
+from elevon.cli.output import answer
+from elevon.cli.shell import Answer, command
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -40,7 +41,7 @@ def export() -> None:
     """Write an actuator for other tools (docs/deploy.md)."""
 
 
-@app.command()
+@command(app)
 def fmu(
     actuator: ActuatorArgument,
     *,
@@ -57,8 +58,7 @@ def fmu(
         typer.Option(help="As FMI 3.0 names it, such as x86_64-linux; this installation's."),
     ] = None,
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> None:
+) -> Answer:
     """Write an FMU for co-simulation: inputs, faults' severities, outputs, parameters."""
     from elevon.deploy import export_fmu
 
@@ -67,15 +67,13 @@ def fmu(
         step=step, platform=platform, force=force,
     )  # fmt: skip
     counts = {f"{role}s": made.count(role) for role in ("input", "output", "parameter")}
-    if json:
-        about = {"file": str(made.path), "bytes": made.bytes, "version": version}
-        print_json({"status": "ok", **about, "fidelity": fidelity, **counts})
-        return
+    about = {"file": str(made.path), "bytes": made.bytes, "version": version}
     texts = ", ".join(f"{count} {name}" for name, count in counts.items())
-    answer(f"wrote {made.path}: FMI {version}, {fidelity} fidelity, {texts}")
+    text = f"wrote {made.path}: FMI {version}, {fidelity} fidelity, {texts}"
+    return Answer({"status": "ok", **about, "fidelity": fidelity, **counts}, lambda: answer(text))
 
 
-@app.command()
+@command(app)
 def run(
     actuator: ActuatorArgument,
     *,
@@ -93,16 +91,14 @@ def run(
         ),
     ] = None,
     force: ForceOption = False,
-    json: JsonOption = False,
-) -> None:
+) -> Answer:
     """Write the document that the C interface makes a run from."""
     from elevon.deploy import run_document
     from elevon.files import write_text
 
     document = run_document(actuator, fidelity=fidelity, mode=mode, signals=signals or ())
     written = write_text(out, document.text(fault or ()), force=force)
-    if json:
-        names = {"outputs": list(document.signals), "inputs": list(document.units)}
-        print_json({"status": "ok", "file": str(written), "fidelity": fidelity, **names})
-        return
-    answer(f"wrote {written}: {fidelity} fidelity, {len(document.signals)} outputs")
+    names = {"outputs": list(document.signals), "inputs": list(document.units)}
+    text = f"wrote {written}: {fidelity} fidelity, {len(document.signals)} outputs"
+    data = {"status": "ok", "file": str(written), "fidelity": fidelity, **names}
+    return Answer(data, lambda: answer(text))

@@ -355,7 +355,7 @@ class Session:
         UnknownNameError
             No such parameter, fault or signal.
         """
-        paths = [*self._tunable(tunable), *self._moved(faults)]
+        paths = announced(self.wiring, tunable, faults)
         names = [self._known(name) for name in texts(signals, "signals")]
         self._core.announce(paths, names)
         self._readable.clear()

@@ -51,7 +51,7 @@ pub struct State<S> {
     handover: Handover<S>,
 }
 
-kept!(State<f64> as State { body, current, line, torque, below, tripped, handover });
+kept!(State<f64> as State { body, current, line, torque, tripped, handover });
 
 #[inline(always)]
 fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &mut State<S>, k: Steps) {
