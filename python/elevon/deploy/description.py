@@ -56,8 +56,7 @@ def description(model: Model, variables: Sequence[FmuVariable], version: str) ->
     for reference, variable in enumerate(variables):
         (_variable2 if version == "2.0" else _variable3)(listed, variable, reference)
     _structure(root, variables, version)
-    indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
+    return _document(root)
 
 
 def terminals(variables: Sequence[FmuVariable]) -> bytes | None:
@@ -78,8 +77,13 @@ def terminals(variables: Sequence[FmuVariable]) -> bytes | None:
                            memberName=member, variableKind="signal")  # fmt: skip
     if not len(listed):
         return None
+    return _document(root)
+
+
+def _document(root: Element) -> bytes:
     indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="utf-8") + b"\n"
+    text: bytes = tostring(root, encoding="utf-8")
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + text + b"\n"
 
 
 def _root(model: Model, version: str) -> Element:
