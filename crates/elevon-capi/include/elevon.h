@@ -1,4 +1,4 @@
-/* C interface of Elevon (docs/deploy.md). Made by cbindgen from crates/elevon-capi/src/c.rs: do not edit. */
+/* C interface of Elevon (docs/how-to/deploy.md). Made by cbindgen from crates/elevon-capi/src/c.rs: do not edit. */
 
 #ifndef ELEVON_H
 #define ELEVON_H

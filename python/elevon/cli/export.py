@@ -17,7 +17,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     no_args_is_help=True,
     cls=NamingGroup,
-    help="Write an actuator for other tools (docs/deploy.md).",
+    help="Write an actuator for other tools (docs/how-to/deploy.md).",
 )
 
 OutOption = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The file to write.")]
@@ -38,7 +38,7 @@ SignalsOption = Annotated[
 
 @app.callback()
 def export() -> None:
-    """Write an actuator for other tools (docs/deploy.md)."""
+    """Write an actuator for other tools (docs/how-to/deploy.md)."""
 
 
 @command(app)

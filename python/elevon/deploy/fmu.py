@@ -64,7 +64,7 @@ def export_fmu(
     platform: str | None = None,
     force: bool = False,
 ) -> FmuFile:
-    """Write an actuator as an FMU for co-simulation (docs/deploy.md).
+    """Write an actuator as an FMU for co-simulation (docs/how-to/deploy.md).
 
     Parameters
     ----------
