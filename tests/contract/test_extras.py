@@ -13,6 +13,7 @@ from elevon import Recording
 from elevon.cli import main
 from elevon.errors import FormatError
 from elevon.extras import APART, EXTRAS, missing_package
+from tests.contract import source
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = {"numpy", "pydantic", "rich", "typer", "elevon"}
@@ -36,27 +37,17 @@ def _name(requirement):
 
 def _imports(path):
     """Packages a module imports when it runs; those of annotations only do not count."""
-    tree = ast.parse(path.read_text("utf-8"))
-    guarded = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
-        for part in node.body
-        for inner in ast.walk(part)
-    }
-    for node in ast.walk(tree):
-        if id(node) in guarded:
-            continue
+    for node in source.of(path).at_run_time:
         if isinstance(node, ast.Import):
             yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+        elif node.module and node.level == 0:
             yield node.module.split(".")[0]
 
 
 def test_every_import_is_of_the_core_or_of_an_extra():
     known = CORE | {package for packages in EXTRAS.values() for package in packages}
     known |= set(sys.stdlib_module_names) | set(BROUGHT)
-    for path in (ROOT / "python/elevon").rglob("*.py"):
+    for path in source.MODULES:
         assert set(_imports(path)) <= known, path
 
 

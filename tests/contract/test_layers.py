@@ -1,11 +1,11 @@
 """Imports point only leftwards: data flows one way, and every package has one job."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[2] / "python" / "elevon"
+from tests.contract import source
+from tests.contract.source import PACKAGE
 
 # From left to right; packages in one row do not import each other. A new package is added here with
 # thought: what it may know of is everything left of it, and nothing else.
@@ -42,13 +42,13 @@ def _package(path):
     return relative.parts[0].removesuffix(".py") if len(relative.parts) > 1 else relative.stem
 
 
-def _imported(tree):
+def _imported(path):
     """Yield the packages that a module imports at run time, also in functions."""
-    for node in _at_run_time(tree):
+    for node in source.of(path).at_run_time:
         names = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, "imports are absolute"
             if node.module == "elevon":
                 names = [f"elevon.{alias.name}" for alias in node.names]
@@ -60,7 +60,7 @@ def _imported(tree):
                 yield parts[1], node.lineno
 
 
-MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+MODULES = [path for path in source.MODULES if path != PACKAGE / "__init__.py"]
 
 
 def test_every_room_has_its_place():
@@ -69,21 +69,23 @@ def test_every_room_has_its_place():
     assert packages <= RANK.keys()
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_point_left(path):
-    package = _package(path)
-    for other, line in _imported(ast.parse(path.read_text(encoding="utf-8"))):
-        place = f"{path.relative_to(PACKAGE)}:{line}"
-        assert other in RANK, f"{place}: {other} is no package of the list"
-        assert other == package or RANK[other] < RANK.get(package, -1), (
-            f"{place}: {package} imports {other}"
-        )
+def test_imports_point_left():
+    wrong = []
+    for path in MODULES:
+        package = _package(path)
+        for other, line in _imported(path):
+            place = f"{path.relative_to(PACKAGE)}:{line}"
+            if other not in RANK:
+                wrong.append(f"{place}: {other} is no package of the list")
+            elif other != package and RANK[other] >= RANK.get(package, -1):
+                wrong.append(f"{place}: {package} imports {other}")
+    assert wrong == []
 
 
 def test_the_package_knows_of_no_study():
     """`studies` stands on the package and is not in the wheel."""
-    for path in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path in source.MODULES:
+        for node in source.of(path).imports:
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             assert not {name.split(".")[0] for name in names} & {"studies", "tests"}, path
@@ -93,8 +95,7 @@ def test_the_package_knows_of_no_study():
 def test_logs_are_read_without_the_bench(package):
     """A real log has no bench of ours behind it: who reads logs knows of none."""
     for path in (PACKAGE / package).rglob("*.py"):
-        packages = [other for other, _ in _imported(ast.parse(path.read_text(encoding="utf-8")))]
-        assert "bench" not in packages, path.relative_to(PACKAGE)
+        assert "bench" not in [other for other, _ in _imported(path)], path.relative_to(PACKAGE)
 
 
 #: What runs a model: in the core, and of runs that are ready for it. Who may call it.
@@ -106,13 +107,13 @@ RUNNERS = {
 }
 
 
-def _core_calls(tree):
+def _core_calls(module):
     """Yield what of the core, or of runs ready for it, a module calls to run a model."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            if node.value.id == "_core" and node.attr in RUNNERS:
-                yield node.attr
-        elif isinstance(node, ast.ImportFrom):
+    for name, attribute in module.attributes:
+        if name == "_core" and attribute in RUNNERS:
+            yield attribute
+    for node in module.imports:
+        if isinstance(node, ast.ImportFrom):
             names = {alias.name for alias in node.names}
             if node.module == "elevon._core":
                 yield from names & RUNNERS.keys()
@@ -122,15 +123,15 @@ def _core_calls(tree):
 
 def test_runs_of_the_core_are_seen():
     text = "from elevon import _core\n_core.simulate()\nfrom elevon._core import Session\n"
-    assert set(_core_calls(ast.parse(text))) == {"simulate", "Session"}
-    assert set(_core_calls(ast.parse("_core.faults('rotary')"))) == set()
+    assert set(_core_calls(source.parsed(text))) == {"simulate", "Session"}
+    assert set(_core_calls(source.parsed("_core.faults('rotary')"))) == set()
 
 
 def test_the_core_is_simulated_by_its_three_doors_only():
     wrong = [
         f"{path.relative_to(PACKAGE)}: {name}"
         for path in MODULES
-        for name in _core_calls(ast.parse(path.read_text(encoding="utf-8")))
+        for name in _core_calls(source.of(path))
         if _package(path) not in RUNNERS[name]
     ]
     assert wrong == []
@@ -145,26 +146,15 @@ def _module_names():
     }
 
 
-def _imported_modules(tree, modules):
+def _imported_modules(path, modules):
     """Yield the modules of the package that a module imports, also inside functions."""
-    for node in _at_run_time(tree):
-        names = []
+    for node in source.of(path).at_run_time:
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
+        else:
             names = [f"{node.module}.{alias.name}" for alias in node.names]
             names = [name if name in modules else node.module for name in names]
         yield from (name for name in names if name in modules)
-
-
-def _at_run_time(tree):
-    skipped = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-        for inner in ast.walk(node)
-    }
-    return (node for node in ast.walk(tree) if id(node) not in skipped)
 
 
 def circles(edges):
@@ -200,8 +190,5 @@ def test_circles_are_seen():
 
 def test_no_modules_import_each_other_in_a_circle():
     modules = _module_names()
-    edges = {
-        name: set(_imported_modules(ast.parse(path.read_text(encoding="utf-8")), modules))
-        for name, path in modules.items()
-    }
+    edges = {name: set(_imported_modules(path, modules)) for name, path in modules.items()}
     assert circles(edges) == []
