@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from elevon.parameters import ParameterSet, load_set, set_names
+from elevon.parameters import Parameter, ParameterSet, load_set, set_names
 from elevon.plain import Plain
 
 
@@ -34,6 +34,8 @@ class Actuator(Plain):
         Thresholds of `elevon validate`: ``transient`` [s] and ``limits``.
     compare : mapping or None
         What `elevon compare` runs: ``after`` [s], ``load`` and ``scenario``.
+    design : mapping
+        Name to `Parameter`: the few numbers that rules derived the rest from; empty without any.
 
     Examples
     --------
@@ -50,6 +52,7 @@ class Actuator(Plain):
     path: Path | None = field(default=None, compare=False, repr=False)
     validation: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
     compare: Mapping[str, Any] | None = field(default=None, compare=False, repr=False)
+    design: Mapping[str, Parameter] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def load(cls, reference: str | os.PathLike[str]) -> Actuator:
@@ -73,6 +76,7 @@ class Actuator(Plain):
             path=loaded.path,
             validation=loaded.validation,
             compare=loaded.compare,
+            design=loaded.design,
         )
 
     def with_values(

@@ -27,6 +27,13 @@ def show(
         Path | None,
         typer.Option(metavar="FILE", help="Write the JSON Schema of its actuator files."),
     ] = None,
+    changed: Annotated[
+        bool,
+        typer.Option(
+            "--changed",
+            help="Only what is neither derived by a rule nor neutral: given or assumed.",
+        ),
+    ] = False,
     notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
     fidelity: common.OnlyFidelityOption = None,
     not_modelled: common.NotModelledOption = False,
@@ -42,6 +49,8 @@ def show(
     loaded = common.read_actuator(actuator, settings)
     check(fidelity, [loaded.wiring])
     parameters = _chosen(loaded, fidelity, not_modelled)
+    if changed:
+        parameters = _changed(actuator, parameters)
     if svg is not None:
         from elevon.files import write_text
 
@@ -50,7 +59,8 @@ def show(
     if schema is not None:
         _write_schema(schema, loaded.wiring, force=force)
     data = _as_json(loaded, svg, parameters)
-    return Answer(data, lambda: _print(loaded, parameters, notes))
+    show_these = _print_changed if changed else _print
+    return Answer(data, lambda: show_these(loaded, parameters, notes))
 
 
 def _print(loaded: Any, parameters: list[Any], notes: bool) -> None:
@@ -64,6 +74,27 @@ def _print(loaded: Any, parameters: list[Any], notes: bool) -> None:
         typer.echo("")
         for key, text in loaded.references.items():
             typer.echo(f"{key}: {text}")
+
+
+def _print_changed(loaded: Any, parameters: list[Any], notes: bool) -> None:
+    typer.echo(f"{loaded.name}: {loaded.title}")
+    design = [item for item in loaded.design.values() if item.confidence != "derived"]
+    rows = [[item.path, item.text, item.confidence, item.source] for item in design]
+    rows += [
+        [p.path, p.text, p.confidence, p.source] + ([p.note] if notes else []) for p in parameters
+    ]
+    if rows:
+        print_table(["number", "value", "confidence", "source"] + (["note"] if notes else []), rows)
+    else:
+        typer.echo("every value is derived by a rule or neutral")
+
+
+def _changed(reference: str, parameters: list[Any]) -> list[Any]:
+    """Return what the files state themselves, or the command line sets."""
+    from elevon.parameters import load_set
+
+    stated = load_set(reference).stated
+    return [p for p in parameters if p.path in stated or p.confidence == "override"]
 
 
 def _chosen(loaded: Any, fidelity: str | None, not_modelled: bool) -> list[Any]:
@@ -111,6 +142,15 @@ def _as_json(loaded: Any, svg: Path | None, parameters: list[Any]) -> dict[str, 
         "hash": loaded.hash,
         "references": loaded.references,
         "svg": svg,
+        "design": {
+            name: {
+                "value": item.value,
+                "text": item.text,
+                "confidence": item.confidence,
+                "source": item.source,
+            }
+            for name, item in loaded.design.items()
+        },
         "parameters": [
             {
                 "path": p.path,

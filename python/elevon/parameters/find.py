@@ -12,6 +12,7 @@ from elevon.files import visible
 VARIABLE = "ELEVON_ACTUATORS"
 
 _SHIPPED = Path(__file__).parent.parent / "actuators"
+_NEUTRAL = Path(__file__).parent / "neutral"
 
 
 def set_paths() -> dict[str, Path]:
@@ -27,7 +28,17 @@ def set_names() -> list[str]:
 
 def is_shipped(path: Path) -> bool:
     """Return whether a file is one that the package ships."""
-    return path.resolve().parent == _SHIPPED.resolve()
+    return path.resolve().parent in (_SHIPPED.resolve(), _NEUTRAL.resolve())
+
+
+def is_neutral(path: Path) -> bool:
+    """Return whether a file is a neutral base: complete only with the rules of a design."""
+    return path.resolve().parent == _NEUTRAL.resolve()
+
+
+def neutral_names() -> list[str]:
+    """Return the names that a file with a design may have as its base."""
+    return sorted(path.stem for path in visible(_NEUTRAL, "*.toml"))
 
 
 def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> Path:
@@ -54,6 +65,8 @@ def find_set(reference: str | os.PathLike[str], folder: Path | None = None) -> P
     known = set_paths()
     if text in known:
         return known[text]
+    if text in neutral_names():
+        return _NEUTRAL / f"{text}.toml"
     near = [place / f"{text}.toml" for place in (folder or Path(), Path())]
     path = next((place for place in near if _is_file(place)), None)
     if path is None:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import os
 import re
+import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, unknown
-from elevon.parameters.find import find_set, is_shipped
+from elevon.parameters.design import Derivation, Given, derive, design_scenario, read_design
+from elevon.parameters.find import find_set, is_neutral, is_shipped
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import Record, records, wiring_names
 from elevon.parameters.set import ParameterSet
 from elevon.units import parse_quantity, split_quantity
 
 _HEADER_KEYS = (
-    "name", "title", "wiring", "base", "references", "scenario", "compare", "validation",
+    "name", "title", "wiring", "base", "references", "scenario", "compare", "validation", "design",
 )  # fmt: skip
 
 
@@ -46,6 +48,10 @@ class SetFile:
         ``transient`` [s] and ``limits``: signal to largest RMS error in percent of its range.
     compare : mapping or None
         ``after`` [s], ``load`` and ``scenario``: what `elevon compare` runs.
+    design : mapping
+        Name to `Parameter`: the numbers that the rules derive the rest from; empty without any.
+    stated : frozenset of str
+        Paths that the file, or a base of the caller's own, states itself; of a shipped file all.
     """
 
     name: str
@@ -57,6 +63,8 @@ class SetFile:
     scenario: Mapping[str, Any] | None
     validation: Mapping[str, Any] | None = None
     compare: Mapping[str, Any] | None = None
+    design: Mapping[str, Parameter] = field(default_factory=dict)
+    stated: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -68,13 +76,15 @@ class _Layer:
     entries: Mapping[str, Any]
 
 
-def load_set(reference: str | os.PathLike[str]) -> SetFile:
+def load_set(reference: str | os.PathLike[str], text: str | None = None) -> SetFile:
     """Load an actuator file by name or path, with the files it is based on.
 
     Parameters
     ----------
     reference : str or path
         Name of an actuator, or a TOML file.
+    text : str, optional
+        What the file will hold, before it is written.
 
     Returns
     -------
@@ -87,8 +97,8 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         The file cannot be read, has unknown keys or paths, wrong units or values outside their
         range, or lacks a parameter; the message names file, line, path and limit.
     """
-    path = find_set(reference)
-    layers = list(_chain(path))
+    path = find_set(reference) if text is None else Path(reference)
+    layers = list(_chain(path, text))
     wiring = next((layer.header.wiring for layer in layers if layer.header.wiring), None)
     top = layers[0]
     if wiring is None:
@@ -97,12 +107,13 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         raise InputError(
             f"{top.document.place(('wiring',))}: unknown wiring {wiring!r}; {_wirings()}"
         )
-    entries: dict[str, Parameter] = {}
+    entries, design = _resolved(layers, wiring)
     references: dict[str, str] = {}
     for layer in reversed(layers):
-        entries.update(_marked(_parameters(layer, wiring, entries), entries, layer, wiring))
         references.update({item.key: item.text for item in layer.header.references})
     scenario = next((layer.header.scenario for layer in layers if layer.header.scenario), None)
+    if scenario is None and design:
+        scenario = design_scenario(design)
     return SetFile(
         name=top.header.name or _name_of(path),
         title=next((layer.header.title for layer in layers if layer.header.title), ""),
@@ -113,7 +124,49 @@ def load_set(reference: str | os.PathLike[str]) -> SetFile:
         scenario=scenario,
         validation=_table(layers, "validation"),
         compare=_table(layers, "compare"),
+        design=design,
+        stated=_stated(layers),
     )
+
+
+def _stated(layers: list[_Layer]) -> frozenset[str]:
+    """Return what the caller's own files state, or the first shipped one where there are none."""
+    own = [layer for layer in layers if not is_shipped(Path(layer.document.origin))]
+    return frozenset(path for layer in own or layers for path, _ in _leaves(layer.entries, ()))
+
+
+def _resolved(
+    layers: list[_Layer], wiring: str
+) -> tuple[dict[str, Parameter], Mapping[str, Parameter]]:
+    """Return every entry of a chain of files, and the design that the rules derived some from.
+
+    The rules act at the last file that states a number of a design, on all that the files up to it
+    state themselves; what a file above states (a calibrated value) moves no rule.
+    """
+    entries: dict[str, Parameter] = {}
+    own: dict[str, Parameter] = {}
+    given, design = Given({}, {}), Derivation({}, {})
+    last = next((layer for layer in layers if layer.header.design is not None), None)
+    for layer in reversed(layers):
+        if layer.header.design is not None:
+            given = read_design(layer.document, wiring).over(given)
+        own.update(_parameters(layer, wiring, {**entries, **own}))
+        if is_neutral(Path(layer.document.origin)):
+            entries, own = own, {}
+            _check_design(layers, layer, last)
+        if layer is last:
+            stated = {**entries, **own}
+            design = derive(wiring, given, stated, layer.document.place())
+            entries.update(design.parameters)
+    return {**entries, **own}, design.design
+
+
+def _check_design(layers: list[_Layer], neutral: _Layer, last: _Layer | None) -> None:
+    if last is None:
+        raise InputError(
+            f"{layers[0].document.place()}: {Path(neutral.document.origin).stem} is complete only "
+            "with [design] and its numbers (elevon new --help)"
+        )
 
 
 def _name_of(path: Path) -> str:
@@ -157,22 +210,6 @@ def _entry_errors(path: Path) -> list[str]:
     return []
 
 
-def _marked(
-    parameters: Mapping[str, Parameter], base: Mapping[str, Parameter], layer: _Layer, wiring: str
-) -> dict[str, Parameter]:
-    """Mark what an actuator file changes in its base, or in the defaults the base leaves."""
-    if not layer.header.base or is_shipped(Path(layer.document.origin)):
-        return dict(parameters)
-    known = records(wiring)
-    marked = {}
-    for path, item in parameters.items():
-        below = base.get(path)
-        value = known[path].default_value() if below is None else below.value
-        changed = value is not None and value != item.value
-        marked[path] = replace(item, changed=changed or (below is not None and below.changed))
-    return marked
-
-
 def _table(layers: list[_Layer], name: str) -> Mapping[str, Any] | None:
     """Return a table of the header, the nearest one down the bases."""
     tables = (getattr(layer.header, name) for layer in layers)
@@ -180,7 +217,7 @@ def _table(layers: list[_Layer], name: str) -> Mapping[str, Any] | None:
     return None if table is None else table.model_dump()
 
 
-def _chain(path: Path) -> Iterator[_Layer]:
+def _chain(path: Path, text: str | None = None) -> Iterator[_Layer]:
     """Yield the layers from a file down to its last base."""
     from elevon.parameters.model import ActuatorHeader
 
@@ -192,7 +229,10 @@ def _chain(path: Path) -> Iterator[_Layer]:
             names = " -> ".join(item.name for item in [*seen, resolved])
             raise InputError(f"{path}: the bases go round in a circle: {names}")
         seen.append(resolved)
-        document = read_toml(following)
+        if text is None or following is not path:
+            document = read_toml(following)
+        else:
+            document = Document(str(path), text, tomllib.loads(text), path.parent)
         values = {
             key: value
             for key, value in document.data.items()

@@ -92,3 +92,6 @@ class ActuatorHeader(_Strict):
         None, description="What `elevon compare` runs; without it, the scenario above"
     )
     validation: ValidationLimits | None = Field(None, description="Thresholds of `elevon validate`")
+    design: dict[str, Any] | None = Field(
+        None, description="Few numbers from which rules derive the rest (elevon new)"
+    )

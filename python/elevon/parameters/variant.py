@@ -45,8 +45,7 @@ def variant_text(name: str, base: Actuator, reference: str) -> str:
     InputError
         The name cannot be one of an actuator.
     """
-    if not _NAME.fullmatch(name):
-        raise InputError(f"{name!r}: a name has letters, digits, '.', '_' and '-'")
+    checked_name(name)
     known = records(base.wiring)
     title = base.title.replace("\\", "").replace('"', "'")
     lines = _HEAD.format(name=name, base=reference, title=f"Variant of {title}").splitlines()
@@ -58,6 +57,13 @@ def variant_text(name: str, base: Actuator, reference: str) -> str:
             group = part
         lines += _entry(parameter, known[path])
     return "\n".join(lines) + "\n"
+
+
+def checked_name(name: str) -> str:
+    """Return the name of an actuator; `InputError` where it cannot be one."""
+    if not _NAME.fullmatch(name):
+        raise InputError(f"{name!r}: a name has letters, digits, '.', '_' and '-'")
+    return name
 
 
 def _entry(parameter: Parameter, record: Record) -> list[str]:
