@@ -92,3 +92,56 @@ def test_check_of_a_set_reads_the_units_of_its_scenario(elevon_cli, tmp_path):
     (row,) = result.json["findings"]
     assert "mine.toml:6" in row["message"]
     assert "'7 deg'" in row["message"]
+
+
+NUMBERS = ("--linear", "--supply", "28V", "--power", "50W", "--lead", "2mm", "--gear", "4")
+
+
+def test_a_file_of_few_numbers_is_one_page_and_passes_its_check(elevon_cli, tmp_path):
+    made = elevon_cli("new", "mine", *NUMBERS, "--encoder", "1024", "--bench", "bench.toml")
+    assert made.out.startswith("wrote mine.toml: 1440 N at 25 mm/s, motor 3000 rpm and 3.032 A")
+    assert "ASSUMED motor_speed 3000 rpm" in made.out
+    lines = (tmp_path / "mine.toml").read_text().splitlines()
+    assert len([line for line in lines if line and not line.startswith("#")]) <= 40
+    assert elevon_cli("check", "mine.toml").out == "mine.toml: 0 errors, 0 warnings\n"
+    # every line, its # removed, is a number of the design of the same value
+    text = re.sub(r"(?m)^# ([a-z_]+ = )", r"\1", (tmp_path / "mine.toml").read_text())
+    (tmp_path / "free.toml").write_text(text)
+    free, mine = Actuator.load("free.toml"), Actuator.load("mine.toml")
+    assert set(free.design) == set(mine.design)
+    for name, item in mine.design.items():
+        assert free.design[name].value == pytest.approx(item.value, rel=1e-3)
+
+
+def test_a_design_of_another_and_what_is_changed(elevon_cli, tmp_path):
+    elevon_cli("new", "mine", *NUMBERS)
+    assert elevon_cli("new", "low", "--from", "mine.toml", "--supply", "24V").code == 0
+    text = (tmp_path / "low.toml").read_text().replace("\n[design]", "\nmotor.pole_pairs = 5\n[design]")
+    (tmp_path / "low.toml").write_text(text)
+    answer = elevon_cli("show", "low.toml", "--changed", "--json").json
+    assert [row["path"] for row in answer["parameters"]] == ["motor.pole_pairs"]
+    design = {name: row["confidence"] for name, row in answer["design"].items()}
+    assert answer["design"]["supply"]["text"] == "24 V"
+    assert (design["motor_speed"], design["speed"]) == ("assumed", "derived")
+    printed = elevon_cli("show", "low.toml", "--changed").out
+    assert "design.motor_speed" in printed
+    assert "design.speed" not in printed
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (NUMBERS[1:], "one of --linear, --rotary or --from"),
+        ((*NUMBERS, "--torque", "5 N m"), "--linear takes --thrust"),
+        ((*NUMBERS, "--motor", "torque_konstant=1 N m/A"), "did you mean 'torque_constant'"),
+        ((*NUMBERS, "--motor", "resistance"), "KEY=QUANTITY"),
+        ((*NUMBERS, "--mass", "3"), "--mass: 3 has no unit; write it like '3 kg'"),
+        (("--from", "torino-rotary", "--supply", "270V"), "has no [design]"),
+        (("--rotary", "--supply", "270V"), "lacks power (or torque and speed"),
+    ],
+)
+def test_new_refuses_and_writes_nothing(elevon_cli, tmp_path, options, text):
+    refused = elevon_cli("new", "mine", *options)
+    assert refused.code == 2
+    assert text in refused.err
+    assert not (tmp_path / "mine.toml").exists()

@@ -49,17 +49,21 @@ def test_what_acts_or_is_neutral_says_nothing(elevon_cli, options):
     assert "warning" not in result.err
 
 
-def test_a_set_of_the_users_own_counts_where_it_differs_from_its_base(elevon_cli, tmp_path):
-    entry = (
-        "[solver.step]\nvalue = {}\nunit = 'us'\nsource = 'ASSUMED: a test'\n"
-        "confidence = 'assumed'\n"
+def test_what_a_file_states_warns_in_no_run_and_check_lists_it(elevon_cli, tmp_path):
+    path = tmp_path / "own.toml"
+    entry = 'value = {}\nunit = "{}"\nsource = "ASSUMED: a test"\nconfidence = "assumed"\n'
+    path.write_text(
+        'base = "torino-rotary"\n[pwm.frequency]\n'
+        + entry.format(5.0, "kHz")
+        + "[solver.step]\n"
+        + entry.format(2.0, "us")
     )
-    for value, code in ((1, 0), (2, 2)):
-        path = tmp_path / f"own-{value}.toml"
-        head = f'name = "own-{value}"\nbase = "torino-rotary"\n'
-        path.write_text(head + entry.format(value))
-        options = ("--duration", "0.01", "--fidelity", "low", "--strict")
-        assert elevon_cli("simulate", path, *options).code == code
+    options = ("--duration", "0.01", "--fidelity", "low", "--strict")
+    assert elevon_cli("simulate", path, *options).code == 0
+    notes = [row["message"] for row in elevon_cli("check", path, "--json").json["findings"]]
+    (note,) = [text for text in notes if "without effect" in text]  # the step acts at one fidelity
+    assert "pwm.frequency = 5 kHz" in note
+    assert "drive.kind" in note
 
 
 def test_a_plan_refuses_it_unless_it_allows_it(elevon_cli, tmp_path):

@@ -18,7 +18,6 @@ def test_a_base_and_one_number_are_enough(tmp_path):
     assert mine.name == "fast-gear"
     ratio = mine.parameters["gear.ratio"]
     assert (ratio.value, ratio.source, ratio.confidence) == (50.0, "given by the caller", "unknown")
-    assert ratio.changed
     assert mine.parameters["motor.inertia"].value == 9e-4
     assert mine.parameters["motor.inertia"].text == "9 kg cm2"
     others = [p for p in BASE.parameters if p not in {"gear.ratio", "motor.inertia"}]

@@ -188,7 +188,7 @@ def test_commands_of_a_page_in_their_order(page, tmp_path):
             )
             assert done.returncode == 0, f"{line}\n{done.stderr}"
             variant = tmp_path / "mine.toml"
-            if words[1] == "new" and page == "docs/how-to/own-actuators.md":
+            if words[1:3] == ["new", "mine"] and page == "docs/how-to/own-actuators.md":
                 variant.write_text(_blocks(page, "toml")[0], "utf-8")
 
 

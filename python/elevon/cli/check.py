@@ -13,6 +13,9 @@ from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
 
+#: In the order in which findings are printed; a note needs nothing to be done.
+_SEVERITIES = ("error", "warning", "note")
+
 
 @command(app)
 def check(
@@ -47,10 +50,24 @@ def check(
 
 
 def _print(file: Path, rows: list[dict[str, Any]]) -> None:
-    errors = sum(row["severity"] == "error" for row in rows)
-    answer(f"{file}: {errors} errors, {len(rows) - errors} warnings")
+    counts = {name: sum(row["severity"] == name for row in rows) for name in _SEVERITIES}
+    notes = f", {counts['note']} notes" if counts["note"] else ""
+    answer(f"{file}: {counts['error']} errors, {counts['warning']} warnings{notes}")
     if rows:
-        print_table(("severity", "finding"), [(row["severity"], row["message"]) for row in rows])
+        print_table(("severity", "finding"), _grouped(rows))
+
+
+def _grouped(rows: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Return errors first, each by itself, then the rest, those of one group in one row."""
+    alone = [(row["severity"], row["message"]) for row in rows if "group" not in row]
+    groups: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if "group" in row:
+            groups.setdefault((row["severity"], row["group"]), []).append(row["name"])
+    joined = [
+        (severity, f"{group}: {', '.join(names)}") for (severity, group), names in groups.items()
+    ]
+    return sorted([*alone, *joined], key=lambda row: _SEVERITIES.index(row[0]))
 
 
 def _of_scenario(file: Path, reference: str | None) -> list[dict[str, Any]]:
@@ -113,18 +130,32 @@ def _together(file: Path) -> list[dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for fidelity in wirings()[actuator.wiring]["fidelities"]:
         for item in actuator.findings(fidelity):
-            text = f"{item['path']}: {item['message']} ({fidelity} fidelity)"
+            start = "" if item["message"].startswith(item["path"]) else f"{item['path']}: "
+            text = f"{start}{item['message']} ({fidelity} fidelity)"
             rows.setdefault(item["message"], _row(str(item["severity"]), text))
-    rows |= {path: _row("warning", text) for path, text in _unsaid(actuator)}
-    return list(rows.values())
+    found = [*rows.values(), *_unsaid(actuator), *_idle(actuator, file)]
+    return sorted(found, key=lambda row: _SEVERITIES.index(row["severity"]))
 
 
-def _unsaid(actuator: Any) -> list[tuple[str, str]]:
+def _unsaid(actuator: Any) -> list[dict[str, Any]]:
     return [
-        (item.path, f"{item.path} = {item.text}: source not said, confidence unknown")
+        _member("warning", "no source is stated for", f"{item.path} = {item.text}")
         for item in actuator.parameters.values()
         if item.confidence == "unknown"
     ]
+
+
+def _idle(actuator: Any, file: Path) -> list[dict[str, Any]]:
+    """Return what the file states that acts at no fidelity as long as the rest stays."""
+    from elevon.parameters import load_set
+    from elevon.simulate.acting import idle_values
+
+    idle = idle_values(actuator, sorted(load_set(file).stated))
+    return [_member("note", f"without effect, {why}", name) for name, why in idle.items()]
+
+
+def _member(severity: str, group: str, name: str) -> dict[str, Any]:
+    return {**_row(severity, f"{name}: {group}"), "group": group, "name": name}
 
 
 def _row(severity: str, message: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, unknown
 from elevon.parameters.design import Derivation, Given, derive, design_scenario, read_design
-from elevon.parameters.find import find_set, is_neutral, is_shipped
+from elevon.parameters.find import find_set, is_neutral, is_shipped, neutral_names
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import Record, records, wiring_names
 from elevon.parameters.set import ParameterSet
@@ -155,6 +155,11 @@ def _resolved(
             entries, own = own, {}
             _check_design(layers, layer, last)
         if layer is last:
+            if not is_neutral(Path(layers[-1].document.origin)):
+                raise InputError(
+                    f"{layer.document.place(('design',))}: the file has no neutral base for the "
+                    f"rules to fill ({', '.join(neutral_names())})"
+                )
             stated = {**entries, **own}
             design = derive(wiring, given, stated, layer.document.place())
             entries.update(design.parameters)

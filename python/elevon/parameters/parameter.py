@@ -39,8 +39,7 @@ class Parameter:
     interval : tuple of float, optional
         SI limits of the calibrated value's interval.
     changed : bool
-        The caller gave another value than the file (or, in a file of the caller, than its base):
-        where it has no effect, that is reported.
+        The caller gave another value than the file: where it has no effect, a run reports it.
     """
 
     path: str

@@ -81,9 +81,10 @@ def _reasons(
 ) -> dict[str, str]:
     """Return what the caller set, each with why it has no effect; empty where it has one.
 
-    Of the parameters those count that the caller changed, not what an actuator file carries for
-    another drive; of the faults those of a severity other than zero. Parameters that have an effect
-    are there with `every` only: to write out their values costs more than the rest.
+    Of the parameters those count that the run changes, not what an actuator file carries for
+    another drive (`elevon check` lists that); of the faults those of a severity other than zero.
+    Parameters that have an effect are there with `every` only: to write out their values costs more
+    than the rest.
     """
     from elevon import _core
 
@@ -137,6 +138,30 @@ def _of_fault(
         path, neutral = item.get("parameter", ""), item["default"] or 0.0
         if not resting and fault["attributes"].get(item["name"], neutral) != neutral:
             yield f"{name}: {item['name']}", f"{path}: {idle[path]}" if path in idle else ""
+
+
+def idle_values(actuator: Actuator, paths: Iterable[str]) -> dict[str, str]:
+    """Return which of some values, away from neutral, act at no fidelity without faults.
+
+    Returns
+    -------
+    dict
+        Value as written (``pwm.frequency = 4 kHz``) to the reason.
+    """
+    from elevon import _core
+    from elevon.parameters.records import wirings
+
+    known, vector = records(actuator.wiring), actuator.parameters.vector()
+    away = [p for p in paths if actuator.parameters[p].value != known[p].default_value()]
+    idle: list[dict[str, str]] = []
+    for fidelity in wirings()[actuator.wiring]["fidelities"] if away else ():
+        rows = _core.not_acting(actuator.wiring, fidelity, vector, [], away)
+        idle.append({item["path"]: item["reason"] for item in rows})
+    return {
+        f"{path} = {actuator.parameters[path].text}": idle[0][path]
+        for path in away
+        if all(path in found for found in idle)
+    }
 
 
 @contextmanager

@@ -122,7 +122,7 @@ CONTROL: Mapping[str, tuple[Rule, ...]] = {
     "sensor.encoder.pulses": (
         Rule(
             "counts-per-turn",
-            lambda v: v("encoder") / 4 * turns_per_output(v),
+            lambda v: v("encoder") / 4 * turns_per_output(v) / (2 * math.pi),
             "counts per turn of the motor, over four edges, per metre of the ram",
             form="ballscrew",
         ),
