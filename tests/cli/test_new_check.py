@@ -116,7 +116,11 @@ def test_a_file_of_few_numbers_is_one_page_and_passes_its_check(elevon_cli, tmp_
 def test_a_design_of_another_and_what_is_changed(elevon_cli, tmp_path):
     elevon_cli("new", "mine", *NUMBERS)
     assert elevon_cli("new", "low", "--from", "mine.toml", "--supply", "24V").code == 0
-    text = (tmp_path / "low.toml").read_text().replace("\n[design]", "\nmotor.pole_pairs = 5\n[design]")
+    text = (
+        (tmp_path / "low.toml")
+        .read_text()
+        .replace("\n[design]", "\nmotor.pole_pairs = 5\n[design]")
+    )
     (tmp_path / "low.toml").write_text(text)
     answer = elevon_cli("show", "low.toml", "--changed", "--json").json
     assert [row["path"] for row in answer["parameters"]] == ["motor.pole_pairs"]
