@@ -41,11 +41,11 @@ def test_what_changes_is_followed(tmp_path):
     after = actuator(tmp_path, {**MINE, "supply": "24 V"}).parameters
     for path in ("motor.emf_constant", "control.torque_constant", "pwm.emf_constant"):
         assert after.value(path) == pytest.approx(24 / 28 * before.value(path))
-    own = actuator(tmp_path, MINE, more='motor.inertia = "0.4 kg cm2"\n').parameters
+    heavy = actuator(tmp_path, MINE, more='motor.inertia = "0.4 kg cm2"\n').parameters
     ratio = 4e-5 / before.value("motor.inertia")
     # the bandwidth that the torque allows falls as the inertia grows, so the gain stays
-    assert own.value("control.speed_gain") == pytest.approx(before.value("control.speed_gain"))
-    assert own.value("control.position_gain") == pytest.approx(
+    assert heavy.value("control.speed_gain") == pytest.approx(before.value("control.speed_gain"))
+    assert heavy.value("control.position_gain") == pytest.approx(
         before.value("control.position_gain") / ratio
     )
 

@@ -131,8 +131,8 @@ def load_set(reference: str | os.PathLike[str], text: str | None = None) -> SetF
 
 def _stated(layers: list[_Layer]) -> frozenset[str]:
     """Return what the caller's own files state, or the first shipped one where there are none."""
-    own = [layer for layer in layers if not is_shipped(Path(layer.document.origin))]
-    return frozenset(path for layer in own or layers for path, _ in _leaves(layer.entries, ()))
+    callers = [layer for layer in layers if not is_shipped(Path(layer.document.origin))]
+    return frozenset(path for layer in callers or layers for path, _ in _leaves(layer.entries, ()))
 
 
 def _resolved(
@@ -143,34 +143,35 @@ def _resolved(
     The rules act at the last file that states a number of a design, on all that the files up to it
     state themselves; what a file above states (a calibrated value) moves no rule.
     """
-    entries: dict[str, Parameter] = {}
-    own: dict[str, Parameter] = {}
+    neutral: dict[str, Parameter] = {}
+    stated: dict[str, Parameter] = {}
     given, design = Given({}, {}), Derivation({}, {})
     last = next((layer for layer in layers if layer.header.design is not None), None)
+    _check_design(layers, last)
     for layer in reversed(layers):
         if layer.header.design is not None:
             given = read_design(layer.document, wiring).over(given)
-        own.update(_parameters(layer, wiring, {**entries, **own}))
+        stated.update(_parameters(layer, wiring, {**neutral, **stated}))
         if is_neutral(Path(layer.document.origin)):
-            entries, own = own, {}
-            _check_design(layers, layer, last)
+            neutral, stated = stated, {}
         if layer is last:
-            if not is_neutral(Path(layers[-1].document.origin)):
-                raise InputError(
-                    f"{layer.document.place(('design',))}: the file has no neutral base for the "
-                    f"rules to fill ({', '.join(neutral_names())})"
-                )
-            stated = {**entries, **own}
-            design = derive(wiring, given, stated, layer.document.place())
-            entries.update(design.parameters)
-    return {**entries, **own}, design.design
+            design = derive(wiring, given, {**neutral, **stated}, layer.document.place())
+            neutral.update(design.parameters)
+    return {**neutral, **stated}, design.design
 
 
-def _check_design(layers: list[_Layer], neutral: _Layer, last: _Layer | None) -> None:
-    if last is None:
+def _check_design(layers: list[_Layer], last: _Layer | None) -> None:
+    """Refuse a neutral base without a design, and a design without a neutral base."""
+    base = Path(layers[-1].document.origin)
+    if is_neutral(base) and last is None:
         raise InputError(
-            f"{layers[0].document.place()}: {Path(neutral.document.origin).stem} is complete only "
-            "with [design] and its numbers (elevon new --help)"
+            f"{layers[0].document.place()}: {base.stem} is complete only with [design] and its "
+            "numbers (elevon new --help)"
+        )
+    if not is_neutral(base) and last is not None:
+        raise InputError(
+            f"{last.document.place(('design',))}: the file has no neutral base for the rules to "
+            f"fill ({', '.join(neutral_names())})"
         )
 
 

@@ -33,11 +33,13 @@ class Derivation:
 class Values:
     """Numbers by name or path, SI: given, else by the first rule whose needs are given."""
 
-    def __init__(self, wiring: str, given: Given, own: Mapping[str, Parameter], place: str) -> None:
+    def __init__(
+        self, wiring: str, given: Given, stated: Mapping[str, Parameter], place: str
+    ) -> None:
         self.wiring, self.place = wiring, place
         self.linear = LINEAR[wiring]
         self.given = given
-        self.own = own
+        self.stated = stated
         self.derived: dict[str, Parameter] = {}
         self._open: list[str] = []
 
@@ -51,7 +53,7 @@ class Values:
 
     def __call__(self, name: str) -> float:
         """Return one number in SI."""
-        known = self.own.get(name) or self.given.values.get(name) or self.derived.get(name)
+        known = self.stated.get(name) or self.given.values.get(name) or self.derived.get(name)
         if known is None:
             known = self.derived[name] = self._derive(name)
         assert isinstance(known.value, float)
@@ -74,7 +76,7 @@ class Values:
         return _derived(name, value, rule, self.wiring)
 
 
-def derive(wiring: str, given: Given, own: Mapping[str, Parameter], place: str) -> Derivation:
+def derive(wiring: str, given: Given, stated: Mapping[str, Parameter], place: str) -> Derivation:
     """Derive every parameter that the rules of a wiring know and no file states.
 
     Parameters
@@ -83,7 +85,7 @@ def derive(wiring: str, given: Given, own: Mapping[str, Parameter], place: str) 
         One of `LINEAR`.
     given : Given
         The design.
-    own : mapping
+    stated : mapping
         Path to what the files state themselves; the rules follow it.
     place : str
         Named in errors: the file.
@@ -95,12 +97,12 @@ def derive(wiring: str, given: Given, own: Mapping[str, Parameter], place: str) 
     """
     from elevon.parameters.design.limits import check
 
-    values = Values(wiring, given, own, place)
+    values = Values(wiring, given, stated, place)
     check(values)
     known = records(wiring)
     names = quantities(wiring)
     for name in (*known, *names, "current"):
-        if name not in own and (values.has(name) or values.rule(name) is not None):
+        if name not in stated and (values.has(name) or values.rule(name) is not None):
             values(name)
     found = {**values.derived, **given.values}
     return Derivation(
@@ -112,7 +114,7 @@ def derive(wiring: str, given: Given, own: Mapping[str, Parameter], place: str) 
         {
             path: replace(found[path], path=path)
             for path in known
-            if path in found and path not in own
+            if path in found and path not in stated
         },
     )
 

@@ -70,12 +70,12 @@ def _power(v: Values) -> None:
     load = load_name(v)
     if not all(v.has(name) for name in ("power", "speed", load)):
         return
-    asked = v(load) * v("speed")
-    if asked > useful(v) * _CLOSE:
+    needed = v(load) * v("speed")
+    if needed > useful(v) * _CLOSE:
         _refuse(
             v,
             "power",
-            f"{_text(v, load)} at {_text(v, 'speed')} are {asked:.4g} W; {_text(v, 'power')} at "
+            f"{_text(v, load)} at {_text(v, 'speed')} are {needed:.4g} W; {_text(v, 'power')} at "
             f"the motor's shaft leave {useful(v):.4g} W (efficiency {v('efficiency'):g}, a tenth "
             "to accelerate)",
         )

@@ -131,8 +131,8 @@ def read_design(document: Document, wiring: str) -> Given:
 def _named(table: Mapping[str, Any]) -> list[tuple[str, Any]]:
     motor = table.get("motor", {})
     inner = motor.items() if isinstance(motor, Mapping) else [("", motor)]
-    own = [(name, raw) for name, raw in table.items() if name not in ("source", "motor")]
-    return [*own, *((f"motor.{name}", raw) for name, raw in inner)]
+    plain = [(name, raw) for name, raw in table.items() if name not in ("source", "motor")]
+    return [*plain, *((f"motor.{name}", raw) for name, raw in inner)]
 
 
 def read_number(record: Record, raw: Any, place: str, source: str | None) -> Parameter:

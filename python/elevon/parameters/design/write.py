@@ -46,12 +46,12 @@ def design_text(
     )
     lines = [] if source is None else [f"source = {json.dumps(source, ensure_ascii=False)}"]
     lines += [f"{key} = {_literal(text)}" for key, text in given.items()]
-    rest = [
+    comments = [
         f"# {key} = {_literal(_short(item))}".ljust(34) + f"# {_reason(item)}"
         for key, item in design.items()
         if key not in given and key != "current"
     ]
-    tail = _TAIL + "\n".join(rest) + "\n" if rest else ""
+    tail = _TAIL + "\n".join(comments) + "\n" if comments else ""
     return head + "\n".join(lines) + "\n" + tail
 
 
