@@ -42,7 +42,7 @@ def given_numbers(options: Mapping[str, str | None], motor: Sequence[str] | None
 
 
 @dataclass(frozen=True)
-class Made:
+class NewFiles:
     """The files written, and the actuator."""
 
     file: Path
@@ -99,7 +99,7 @@ class New:
     title: str | None
     source: str | None
 
-    def write(self, bench: Path | None, *, force: bool) -> Made:
+    def write(self, bench: Path | None, *, force: bool) -> NewFiles:
         """Write the file, and the procedure where one is wanted; nothing of a wrong number."""
         from elevon.bench.scaled import scaled_procedure
 
@@ -112,7 +112,7 @@ class New:
         write_text(self.path, text, force=force)
         if bench is not None and procedure is not None:
             write_text(bench, procedure, force=force)
-        return Made(self.path, Actuator.load(str(self.path.resolve())), self.numbers, bench)
+        return NewFiles(self.path, Actuator.load(str(self.path.resolve())), self.numbers, bench)
 
     def _text(self) -> str:
         wiring = self._wiring()

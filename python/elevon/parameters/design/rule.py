@@ -20,7 +20,7 @@ RISE = 80.0
 _COPPER = 3.93e-3
 
 
-class Numbers(Protocol):
+class DesignNumbers(Protocol):
     """What a rule reads: numbers by name, whether the output is linear, choices."""
 
     linear: bool
@@ -51,7 +51,7 @@ class Rule:
     text : str
         The formula in words, and what is assumed.
     given : tuple of str
-        Numbers of the design that must be given for it to serve.
+        DesignNumbers of the design that must be given for it to serve.
     form : str
         The wiring it is for; empty: each.
     unit : str
@@ -69,69 +69,69 @@ class Rule:
     assumed: bool = False
 
 
-def turns_per_output(v: Numbers) -> float:
+def turns_per_output(v: DesignNumbers) -> float:
     """Return motor radians per radian or metre of the output."""
     return v("gear.ratio") * (2.0 * math.pi / v("lead") if v.linear else 1.0)
 
 
-def load_name(v: Numbers) -> str:
+def load_name(v: DesignNumbers) -> str:
     """Return how the design calls its rated load."""
     return "thrust" if v.linear else "torque"
 
 
-def phase_share(v: Numbers) -> float:
+def phase_share(v: DesignNumbers) -> float:
     """Return a phase's share of what a data sheet states between two terminals."""
     return 1.0 / 1.5 if v.word("motor.kind", "brushless") == "dc" else 0.5
 
 
-def phase_emf(v: Numbers) -> float:
+def phase_emf(v: DesignNumbers) -> float:
     """Return the EMF constant of a data sheet's torque constant."""
     share = {"brushless": 1.0 / ROOT3, "servo": math.sqrt(2.0) / 3.0, "dc": 1.0 / 1.5}
     return v("motor.torque_constant") * share[v.word("motor.kind", "brushless")]
 
 
-def peak_current(v: Numbers, name: str) -> float:
+def peak_current(v: DesignNumbers, name: str) -> float:
     """Return the phase current, peak, whose torque a data sheet's current gives."""
     return v("motor.torque_constant") * v(name) / torque_constant(v("motor.emf_constant"))
 
 
-def phase_voltage(v: Numbers) -> float:
+def phase_voltage(v: DesignNumbers) -> float:
     """Return the largest voltage of a phase, peak, that a bridge makes of its link."""
     return v("inverter.supply_voltage") / ROOT3
 
 
-def total_inertia(v: Numbers) -> float:
+def total_inertia(v: DesignNumbers) -> float:
     """Return the inertia on the motor's shaft, the load's share included."""
     load = v("load.mass" if v.linear else "load.inertia")
     return v("motor.inertia") + load / turns_per_output(v) ** 2
 
 
-def rated_voltage(v: Numbers) -> float:
+def rated_voltage(v: DesignNumbers) -> float:
     """Return the quadrature voltage at the rating, winding cold."""
     return v("motor.winding_resistance") * v("current") + v("motor.emf_constant") * v("motor_speed")
 
 
-def rated_heat(v: Numbers) -> float:
+def rated_heat(v: DesignNumbers) -> float:
     """Return the copper's heat [W] at the rated current, winding warm."""
     return copper_loss(v("motor.winding_resistance"), v("current")) * (1.0 + _COPPER * RISE)
 
 
-def useful(v: Numbers) -> float:
+def useful(v: DesignNumbers) -> float:
     """Return the power [W] that the output gives at the rating."""
     return _RESERVE * v("efficiency") * v("power")
 
 
-def load_efficiency(v: Numbers) -> float:
+def load_efficiency(v: DesignNumbers) -> float:
     """Return the efficiency that is left for the load's own friction."""
     return 2.0 * v("efficiency") / (1.0 + v("efficiency"))
 
 
-def supply_speed(v: Numbers) -> float:
+def supply_speed(v: DesignNumbers) -> float:
     """Return the speed at which a given motor takes nine tenths of the voltage at its current."""
     drop = v("motor.winding_resistance") * v("current")
     return (_RESERVE * phase_voltage(v) - drop) / v("motor.emf_constant")
 
 
-def power_of_load(v: Numbers) -> float:
+def power_of_load(v: DesignNumbers) -> float:
     """Return the power [W] at the motor's shaft that a given load at its speed takes."""
     return v(load_name(v)) * v("speed") / (_RESERVE * v("efficiency"))
