@@ -133,8 +133,8 @@ def _together(file: Path) -> list[dict[str, Any]]:
             start = "" if item["message"].startswith(item["path"]) else f"{item['path']}: "
             text = f"{start}{item['message']} ({fidelity} fidelity)"
             rows.setdefault(item["message"], _row(str(item["severity"]), text))
-    found = [*rows.values(), *_unsaid(actuator), *_idle(actuator, file)]
-    return sorted(found, key=lambda row: _SEVERITIES.index(row["severity"]))
+    findings = [*rows.values(), *_unsaid(actuator), *_idle(actuator, file)]
+    return sorted(findings, key=lambda row: _SEVERITIES.index(row["severity"]))
 
 
 def _unsaid(actuator: Any) -> list[dict[str, Any]]:

@@ -160,7 +160,7 @@ def idle_values(actuator: Actuator, paths: Iterable[str]) -> dict[str, str]:
     return {
         f"{path} = {actuator.parameters[path].text}": idle[0][path]
         for path in away
-        if all(path in found for found in idle)
+        if all(path in reasons for reasons in idle)
     }
 
 

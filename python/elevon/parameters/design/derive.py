@@ -104,17 +104,17 @@ def derive(wiring: str, given: Given, stated: Mapping[str, Parameter], place: st
     for name in (*known, *names, "current"):
         if name not in stated and (values.has(name) or values.rule(name) is not None):
             values(name)
-    found = {**values.derived, **given.values}
+    known_values = {**values.derived, **given.values}
     return Derivation(
         {
-            name: found[name]
+            name: known_values[name]
             for name in (*names, "current")
-            if name in found and (name not in known or values.has(name))
+            if name in known_values and (name not in known or values.has(name))
         },
         {
-            path: replace(found[path], path=path)
+            path: replace(known_values[path], path=path)
             for path in known
-            if path in found and path not in stated
+            if path in known_values and path not in stated
         },
     )
 
