@@ -31,11 +31,11 @@ def opened(run, live, **options):
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("console", lambda line: complaints.append(line.text) if line.type == "error" else None)
     page.goto(live.address)
-    until(page, "window.elevonPage?.frames > 2", 90.0)
+    until(page, "window.elevonPage?.frames > 2")
     return page, complaints
 
 
-def until(page, condition, seconds=60.0):
+def until(page, condition, seconds=600.0):
     """Wait for what a page shows; its policy forbids Playwright's own waiting for a condition."""
     end = time.monotonic() + seconds
     while not page.evaluate(condition):

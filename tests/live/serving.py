@@ -40,7 +40,7 @@ class Bench:
         status, body, _ = self.request("act", message, headers)
         return status, json.loads(body)
 
-    def until(self, condition, seconds=60.0):
+    def until(self, condition, seconds=600.0):
         """Wait for a state; the clock only ends a wait that has failed."""
         end = time.monotonic() + seconds
         while not condition(state := self.state()):

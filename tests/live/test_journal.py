@@ -58,7 +58,7 @@ def test_steps_are_done_again_to_the_bit(name, acts):
     assert other.act({"save": True})["steps"] == steps
 
 
-@pytest.mark.parametrize(("name", "acts"), [("pisa-landing-gear", GEAR)])
+@pytest.mark.parametrize(("name", "acts"), [("torino-rotary", ROTARY), ("pisa-landing-gear", GEAR)])
 def test_a_scenario_gives_the_run_to_the_bit(name, acts, tmp_path):
     bench = _bench(name)
     first = _run(bench, acts)

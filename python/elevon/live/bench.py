@@ -285,7 +285,7 @@ class LiveBench:
         return Stretch(
             time, signals, given, load,
             brake=bool(unit.actuator.wiring == "rotary" and brake is not None and np.any(brake)),
-            seed=unit.seed,
+            seed=unit.seed, since=max(unit.given_at, unit.changed_at),
         )  # fmt: skip
 
     def _stretch(self) -> Stretch | str:
@@ -307,13 +307,13 @@ class LiveBench:
         begin = unit.given_at - 0.2
         if unit.time - unit.given_at < _LEAST:
             return "waiting for the end of the motion"
-        time, table = self.loop.ring.stretch(begin, self._columns)
-        signals = dict(zip(self._traced, table.T, strict=True))
-        late = time > time[-1] - _ENDED
-        speed = np.abs(signals["motor_speed"])
+        ring = self.loop.ring
+        time, table = ring.stretch(begin, self._columns)
+        _, speeds = ring.stretch(begin, ring.columns(["motor_speed"]))
+        late, speed = time > time[-1] - _ENDED, np.abs(speeds[:, 0])
         if speed[late].max() > 0.01 * max(speed.max(), 1.0):
             return "waiting for the end of the motion"
-        return self._part(time, signals)
+        return self._part(time, dict(zip(self._traced, table.T, strict=True)))
 
 
 def _length(given: Mapping[str, Any]) -> float:

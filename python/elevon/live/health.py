@@ -1,4 +1,4 @@
-"""Health of a running actuator: diagnosis, again and again, of the last stretch a drive logs.
+"""Health of a running actuator: diagnosis of the last stretch a drive logs, and the monitor.
 
 What is diagnosed are the files that a recording of the same stretch would hold; the list of faults
 is nowhere near. The work is done by a process beside the simulation's, so that it slows nothing.
@@ -20,12 +20,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.errors import ElevonError
-from elevon.live.trace import Stretch, write_stretch
+from elevon.live.trace import LiveMotion, Stretch, write_stretch
+from elevon.live.watching import StreamWatch, Watch
 from elevon.plain import Plain
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.logs.log import Log
 
 
 FALSE_ALARM = 0.005
@@ -66,7 +68,12 @@ class Health(Plain):
     stretch : (float, float) or None
         What was looked at [s].
     since : float or None
-        End of the first of the stretches in a row that are not healthy [s].
+        Where the change began, as the monitor has it; else the end of the first of the stretches in
+        a row that are not healthy [s].
+    onset : bool
+        Whether `since` is the monitor's.
+    watch : Watch or None
+        What the monitor says; None where nothing is watched.
     remaining : str
         Remaining life where a mission is given.
     seconds : float
@@ -79,6 +86,8 @@ class Health(Plain):
     text: str = "waiting for motion"
     stretch: tuple[float, float] | None = None
     since: float | None = None
+    onset: bool = False
+    watch: Watch | None = None
     remaining: str = ""
     seconds: float = 0.0
 
@@ -98,13 +107,15 @@ def health_of(answer: Diagnosis, *, remaining: str = "", seconds: float = 0.0) -
     )  # fmt: skip
 
 
-def examine(path: str, actuator: Actuator, baselines: Sequence[str], mission: str | None) -> Health:
+def examine(
+    log: Log | str, actuator: Actuator, baselines: Sequence[str], mission: str | None
+) -> Health:
     """Diagnose a log; run in the process beside."""
     from elevon.diagnose.door import diagnose
 
     begin = clock.process_time()
     try:
-        answer = diagnose(path, actuator, list(baselines), false_alarm=FALSE_ALARM)
+        answer = diagnose(log, actuator, list(baselines), false_alarm=FALSE_ALARM)
     except ElevonError as error:
         return Health(text=str(error).partition(": ")[2] or str(error))
     remaining = ""
@@ -115,7 +126,57 @@ def examine(path: str, actuator: Actuator, baselines: Sequence[str], mission: st
     return health_of(answer, remaining=remaining, seconds=clock.process_time() - begin)
 
 
-def _work(door: Connection) -> None:
+@dataclass(frozen=True)
+class Request:
+    """What the process beside is asked: the log of a stretch, and the motion it is a part of."""
+
+    path: str
+    motion: LiveMotion
+
+
+class Examiner:
+    """Diagnoses one stretch after the other, and watches the stream that they are.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The healthy unit.
+    baselines : sequence of str
+        Paths of healthy logs.
+    mission : str, optional
+        For the remaining life.
+    """
+
+    def __init__(self, actuator: Actuator, baselines: Sequence[str], mission: str | None) -> None:
+        self._actuator, self._baselines, self._mission = actuator, baselines, mission
+        self._stream = StreamWatch(actuator)
+        self._later: Callable[[], None] | None = None
+
+    def examine(self, request: Request) -> Health:
+        """Return what diagnosis and monitor say of a stretch."""
+        from elevon.logs.read import read_log
+
+        try:
+            log = read_log(request.path)
+        except ElevonError as error:
+            return Health(text=str(error))
+        health = examine(log, self._actuator, self._baselines, self._mission)
+        healthy = health.status == "healthy"
+        watch = self._stream.take(log, request.motion, healthy=healthy)
+        if watch is None and healthy:
+            self._later = lambda: self._stream.learn(log, request.motion)
+        return replace(health, watch=watch)
+
+    def learn(self) -> None:
+        """Do what takes time, when the answer has been given."""
+        if self._later is not None:
+            self._later()
+            self._later = None
+
+
+def _work(
+    door: Connection, actuator: Actuator, baselines: Sequence[str], mission: str | None
+) -> None:
     """Answer requests until the door closes.
 
     Ctrl-C is left to the process that asked, and the processor to the simulation.
@@ -124,9 +185,11 @@ def _work(door: Connection) -> None:
     os.nice(_NICE)
     from elevon.diagnose import door as _ready  # noqa: F401 - loaded before the first request
 
+    examiner = Examiner(actuator, baselines, mission)
     with suppress(EOFError, OSError):
         while True:
-            door.send(examine(*door.recv()))
+            door.send(examiner.examine(door.recv()))
+            examiner.learn()
 
 
 class HealthWatch:
@@ -175,7 +238,8 @@ class HealthWatch:
     def _run(self) -> None:
         context = multiprocessing.get_context("spawn")
         door, inner = context.Pipe()
-        worker = context.Process(target=_work, args=(inner,), name="diagnosis", daemon=True)
+        given = (inner, self._actuator, self._baselines, self._mission)
+        worker = context.Process(target=_work, args=given, name="diagnosis", daemon=True)
         worker.start()
         inner.close()
         try:
@@ -183,6 +247,9 @@ class HealthWatch:
                 self._watch(door, Path(folder))
         except (EOFError, OSError):
             self.health = Health(text="the process that diagnoses has ended")
+        except Exception as error:
+            self.health = Health(text=f"the diagnosis has ended: {error!r}")
+            raise
         finally:
             door.close()
             worker.terminate()
@@ -208,7 +275,7 @@ class HealthWatch:
             write_stretch(path, part, self._actuator, self._fidelity, force=True)
         except ElevonError as error:
             return Health(text=str(error))
-        door.send((str(path), self._actuator, self._baselines, self._mission))
+        door.send(Request(str(path), part.motion))
         while not door.poll(0.05):
             if self._stop.is_set():
                 return None
@@ -218,7 +285,9 @@ class HealthWatch:
     def take(self, answer: Health, part: Stretch) -> None:
         """Keep an answer, with when: what was looked at, and since when it is not healthy."""
         span = (float(part.time[0]), float(part.time[-1]))
-        since = None
-        if answer.status not in ("waiting", "healthy"):
+        since, onset = None, answer.watch is not None and answer.watch.alarm
+        if answer.watch is not None and onset:
+            since = answer.watch.since
+        elif answer.status not in ("waiting", "healthy"):
             since = span[1] if self.health.since is None else self.health.since
-        self.health = replace(answer, stretch=span, since=since)
+        self.health = replace(answer, stretch=span, since=since, onset=onset)

@@ -14,7 +14,7 @@ import numpy as np
 from elevon.errors import InputError
 from elevon.files import check_output, write_bytes, write_text
 from elevon.live.app import asset
-from elevon.live.health import Health, examine
+from elevon.live.health import Examiner, Health, Request
 from elevon.live.trace import write_stretch
 from elevon.plain import plain
 from elevon.results import finite
@@ -95,6 +95,7 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
     rows: list[Floats] = []
     states: list[dict[str, Any]] = []
     broken, noted = False, -np.inf
+    examiner = Examiner(unit.actuator, (), None)
     bench.panel.run(unit, command)
     bench.loop.ring.append(unit.time, unit.values())
     while unit.time < seconds:
@@ -107,7 +108,7 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
             rows.append(bench.loop.ring.latest())
         if unit.time - noted >= _STATES:
             noted = unit.time
-            states.append(_state(bench))
+            states.append(_state(bench, examiner))
     table = np.asarray(rows, dtype=np.float64)
     return {
         "model": bench.describe(),
@@ -117,7 +118,7 @@ def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, An
     }
 
 
-def _state(bench: LiveBench) -> dict[str, Any]:
+def _state(bench: LiveBench, examiner: Examiner) -> dict[str, Any]:
     part = bench.stretch()
     if isinstance(part, str):
         bench.watch.health = Health(text=part)
@@ -125,11 +126,10 @@ def _state(bench: LiveBench) -> dict[str, Any]:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "live.csv"
             write_stretch(path, part, bench.unit.actuator, bench.unit.fidelity)
-            bench.watch.take(examine(str(path), bench.unit.actuator, (), None), part)
+            bench.watch.take(examiner.examine(Request(str(path), part.motion)), part)
+            examiner.learn()
     state = bench.state()
-    # Processor time of a diagnosis differs at every run: two recordings are equal without it.
-    health = {key: value for key, value in state["health"].items() if key != "seconds"}
-    return {**state, "health": health, "control": None, "factor": 1.0}
+    return {**state, "control": None, "factor": 1.0}
 
 
 def _packed(values: Floats, kind: str) -> str:

@@ -45,6 +45,25 @@ _NOISE = 0.05  # N of the load cell. ASSUMED, as on the virtual bench
 
 
 @dataclass(frozen=True)
+class LiveMotion:
+    """What a stretch is a part of.
+
+    Attributes
+    ----------
+    begin : float
+        The stretch's first sample [s].
+    since : float
+        Since when command, loads and parameters have been the same [s].
+    window : float or None
+        Whole periods of the command [s]; None where it does not repeat.
+    """
+
+    begin: float
+    since: float
+    window: float | None
+
+
+@dataclass(frozen=True)
 class Stretch:
     """A stretch of a live run.
 
@@ -65,6 +84,8 @@ class Stretch:
         Of the recorder's noise.
     initial : mapping of str to float
         Where the motion began, as far as the operator knows.
+    since : float
+        Since when command, loads and parameters have been the same [s].
     """
 
     time: Floats
@@ -74,6 +95,14 @@ class Stretch:
     brake: bool = False
     seed: int = 0
     initial: Mapping[str, float] = field(default_factory=dict)
+    since: float = 0.0
+
+    @property
+    def motion(self) -> LiveMotion:
+        """What it is a part of."""
+        from elevon.live.watching import window_of
+
+        return LiveMotion(float(self.time[0]), self.since, window_of(self.command))
 
 
 def trace_signals(actuator: Actuator, fidelity: str) -> list[str]:

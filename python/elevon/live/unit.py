@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from elevon.bench.rig import moved
 from elevon.documents import Document, validated
 from elevon.errors import ArgumentTypeError, DivergedError, InputError, unknown
-from elevon.faults import Fault, catalogue, check_together
+from elevon.faults import Fault, check_together
 from elevon.live.limits import InputRange, check_value, check_waveform, input_ranges
 from elevon.parameters.records import wirings
 from elevon.scenario import Command, Terms
@@ -195,6 +195,7 @@ class LiveUnit:
         elif "." in name:
             if isinstance(value, bool) or not isinstance(value, (int, float, str)):
                 raise ArgumentTypeError(f"{name}: {value!r:.60} is no value")
+            self._session.announce(tunable=[name])
             self._session.set_parameter(name, value)
             self.inputs[name], self.changed_at = value, self.time
         else:
@@ -226,6 +227,7 @@ class LiveUnit:
         others = [other for key, other in self.faults.items() if key != name]
         if resolved["severity"] != 0.0:
             check_together([*others, fault])
+        self._session.announce(faults=[name])
         self._session.set_fault(name, severity, **dict(fault.attributes))
         self.faults.pop(name, None)
         if resolved["severity"] != 0.0:
@@ -252,7 +254,7 @@ class LiveUnit:
             scenario,
             fidelity=self.fidelity,
             seed=self.seed,
-            faults=fault_names(actuator.wiring, self.fidelity),
+            faults=list(self.faults),
             signals=[name for name in _FILTERED if name in known],
         )
         for name, fault in self.faults.items():
@@ -341,13 +343,3 @@ class LiveUnit:
         rounds = len(wirings()[self.actuator.wiring]["actions"])
         self._last_action = number + rounds if self._last_action == number else number
         self._session.set(command=self._last_action)
-
-
-def fault_names(wiring: str, fidelity: str) -> list[str]:
-    """Return ``KIND@PLACE`` of every fault that a model has."""
-    return [
-        f"{record.kind}@{place}"
-        for record in catalogue(wiring)
-        if fidelity in record.fidelities
-        for place in record.places
-    ]

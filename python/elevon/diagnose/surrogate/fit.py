@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +61,7 @@ def fitted(
     high: Mapping[str, TrainingTable],
     low: Mapping[str, TrainingTable],
     plan: TrainingPlan,
-    report: Mapping[str, object],
+    report: Mapping[str, Any],
     progress: Progress | None = None,
 ) -> Surrogate:
     """Train a surrogate.
@@ -94,7 +95,7 @@ def fitted(
 
 def _head(
     high: Rows, low: Rows | None, relative: bool, plan: TrainingPlan, progress: Progress | None
-) -> tuple[Head, dict[str, object]]:
+) -> tuple[Head, dict[str, Any]]:
     rng = np.random.default_rng([plan.seed, 99])
     view = _view(high, relative, rng)
     usable = high.usable()
@@ -205,7 +206,7 @@ def _calibrated(
     *,
     validation: _Validation,
     rng: np.random.Generator,
-) -> tuple[Head, dict[str, object]]:
+) -> tuple[Head, dict[str, Any]]:
     rows, opinion = validation.rows, validation.opinion
     severity = high.table.severity[rows]
     there = severity != 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
 Index = npt.NDArray[np.int64]
 
 
-def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[str, object]:
+def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[str, Any]:
     """Return the scores of a surrogate on drawn units: as trained, and with one baseline each.
 
     Parameters
@@ -27,7 +28,7 @@ def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[st
     tables : mapping of str to TrainingTable
         Test to runs.
     """
-    out: dict[str, object] = {}
+    out = {}
     for name, table in tables.items():
         rows_of = Rows.of(table)
         rows = rows_of.usable()
@@ -43,7 +44,7 @@ def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[st
 
 def judged_at(
     surrogate: Surrogate, tables: Mapping[str, TrainingTable], singles: Mapping[str, TrainingTable]
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Return how often each fault of `ASKED` is called and named, alone, with one baseline.
 
     Parameters
@@ -53,7 +54,7 @@ def judged_at(
     tables, singles : mapping of str to TrainingTable
         Test to runs of drawn units, and to runs of the same units with those faults.
     """
-    out: dict[str, object] = {}
+    out = {}
     for name, table in singles.items():
         rows_of = Rows.of(TrainingTable.joined([tables[name], table]))
         rows = len(tables[name].unit) + np.arange(len(table.unit))
@@ -90,7 +91,7 @@ def _only(opinion: Opinion, rows: Index) -> Opinion:
     )  # fmt: skip
 
 
-def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[str, object]:
+def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[str, Any]:
     """Scores of runs with one fault of one severity, given as at the upper end of its range."""
     logit = honest(head.scaling[:-1], opinion.presence)
     alarm = head.chances(opinion) <= FALSE_ALARM
