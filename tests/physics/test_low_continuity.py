@@ -63,6 +63,24 @@ def test_from_one_current_to_three_windings_there_is_no_step(fault: str, drive: 
     assert max(steps) < 0.05
 
 
+def slow(x: np.ndarray) -> np.ndarray:
+    """Means over 10 ms: what the reduced-order model carries."""
+    return np.convolve(x, np.full(20, 0.05), "valid")
+
+
+@pytest.mark.parametrize("drive", ["hysteresis", "pwm"])
+@pytest.mark.parametrize("fault", [None, "mismatch@sensor.resolver=0.05"])
+def test_one_current_and_three_windings_are_both_the_switching_model(
+    fault: str | None, drive: str
+) -> None:
+    """At a mismatch of 0.05 (references off by 0.1 rad) the windings alone are stepped."""
+    high, low = (swing(drive, fault, "brake", fidelity) for fidelity in FIDELITIES)
+    for name, share in (("current_q", 0.05), ("motor_torque", 0.05), ("motor_speed", 0.01)):
+        found, expected = slow(low[name]), slow(high[name])
+        assert rms(found - expected) < share * rms(expected)
+        assert rms(found) == pytest.approx(rms(expected), rel=0.015)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("drive", ["hysteresis", "pwm"])
 @pytest.mark.parametrize("load", LOADS)
