@@ -113,6 +113,17 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def _announce_extras() -> None:
+    """Let an import that fails for want of an extra say how to install it, in Python, too."""
+    from elevon.extras import MissingExtras
+
+    if not any(isinstance(finder, MissingExtras) for finder in sys.meta_path):
+        sys.meta_path.append(MissingExtras())
+
+
+_announce_extras()
+
+
 def __dir__() -> list[str]:
     return sorted(__all__)
 

@@ -85,8 +85,8 @@ def record_plan(
     record : str, sequence of str or None
         Texts ``SIGNALS@RATE``: names or groups (``drive_log``, ``essential``, ``currents``,
         ``voltages``, ``gear``, ``all``) separated by commas, and a rate with unit, or ``every`` for
-        every solver step. None: drive log and essentials at 400 Hz; of an actuator with a control
-        unit the group ``gear`` at 500 Hz.
+        every solver step. Without ``@RATE`` the rate of None: drive log and essentials at 400 Hz;
+        of an actuator with a control unit the group ``gear`` at 500 Hz.
     units : mapping
         The model's signals.
     step : float
@@ -105,15 +105,17 @@ def record_plan(
         The rate is no whole number of steps (the nearest possible rates are named), or a signal
         is given at two rates.
     """
+    usual = DEFAULT_GEAR_RECORD if "fault_code" in units else DEFAULT_RECORD
     if record is None:
-        record = DEFAULT_GEAR_RECORD if "fault_code" in units else DEFAULT_RECORD
+        record = usual
     texts = [record] if isinstance(record, str) else record
     if not texts:
         raise InputError("record: nothing is recorded; leave it out for the default")
     chosen: dict[int, list[str]] = {}
     owner: dict[str, str] = {}
     for text in texts:
-        names, period = _read(text, units, step)
+        full = text if "@" in text else f"{text}@{usual.partition('@')[2]}"
+        names, period = _read(full, units, step)
         for name in names:
             if owner.setdefault(name, text) != text:
                 raise InputError(f"record: {name!r} is requested twice: {owner[name]!r}, {text!r}")

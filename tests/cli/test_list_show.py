@@ -1,6 +1,7 @@
 """`list` and `show`."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -103,7 +104,10 @@ def test_bad_usage(elevon_cli, arguments, message):
 
 
 def test_version(elevon_cli):
-    assert elevon_cli("--version").out.strip() == _core.version()
+    """The version, and in a checkout its commit."""
+    version, _, commit = elevon_cli("--version").out.strip().partition(" ")
+    assert version == _core.version()
+    assert re.fullmatch(r"\([0-9a-f]{12}\)", commit)
 
 
 def test_the_faults_of_an_actuator_are_its_own(elevon_cli):

@@ -5,6 +5,7 @@ import re
 import sys
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 from elevon import Recording
 from elevon.cli import main
 from elevon.errors import FormatError
-from elevon.extras import APART, EXTRAS, missing_package
+from elevon.extras import APART, EXTRAS, install_command, missing_package
 from tests.contract import source
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,8 +79,42 @@ def test_a_command_whose_extra_is_missing_says_which(tmp_path, monkeypatch, caps
     out = ["--plot", str(tmp_path / "a.png")]
     assert main(["simulate", "torino-rotary", "--duration", "0.01", *out]) == 2
     streams = capsys.readouterr()
-    assert "pip install 'elevon[reports]'" in streams.err
+    assert "elevon[reports]" in streams.err
+    assert install_command("reports") in streams.err
     assert streams.out == ""
+
+
+@pytest.mark.parametrize(
+    ("origin", "command"),
+    [
+        ("", "pip install 'elevon[files]'"),
+        (
+            '{"url": "file:///a/elevon-1.whl"}',
+            "pip install 'elevon[files] @ file:///a/elevon-1.whl'",
+        ),
+        (
+            '{"url": "file:///a/b", "dir_info": {"editable": true}}',
+            "pip install --editable '/a/b[files]'",
+        ),
+    ],
+)
+def test_the_command_installs_from_where_this_copy_came(origin, command, monkeypatch):
+    copy = SimpleNamespace(read_text=lambda _: origin or None)
+    monkeypatch.setattr("importlib.metadata.distribution", lambda _: copy)
+    assert install_command("files") == command
+
+
+def test_an_import_of_elevon_that_lacks_an_extra_says_so_in_python_too(monkeypatch):
+    """A package that no finder knows; somebody else's import and a mere question are not ours."""
+    monkeypatch.setitem(EXTRAS, "files", (*EXTRAS["files"], "no_such_package"))
+    with pytest.raises(ModuleNotFoundError, match=r"elevon\[files\], which is not installed: pip"):
+        exec("import no_such_package", {"__name__": "elevon.recording.convert"})
+    with pytest.raises(ModuleNotFoundError, match="No module named"):
+        exec("import no_such_package", {"__name__": "pandas.io"})
+    question = "import importlib.util as u; found = u.find_spec('no_such_package')"
+    names = {"__name__": "elevon.recording.csv"}
+    exec(question, names)
+    assert names["found"] is None
 
 
 def _recording():

@@ -65,9 +65,9 @@ app = typer.Typer(
 
 def _print_version(value: bool) -> None:
     if value:
-        from elevon import __version__
+        from elevon.cli.version import version_line
 
-        typer.echo(__version__)
+        typer.echo(version_line())
         raise typer.Exit
 
 

@@ -19,14 +19,15 @@ def time_name(recording: Recording, clock: str) -> str:
     return "time" if len(recording.clocks) == 1 else f"time_{clock}"
 
 
-def to_pandas(recording: Recording, clock: str | None) -> pd.DataFrame:
+def to_pandas(recording: Recording, clock: str | None, *, units: bool = False) -> pd.DataFrame:
     """See `Recording.to_pandas`."""
     import pandas as pd
 
     base = recording.clock(clock)
     channels = recording.on_clock(base.name)
-    index = pd.Index(base.time, name="time")
-    table = pd.DataFrame({c.name: c.values for c in channels}, index=index)
+    index = pd.Index(base.time, name="time [s]" if units else "time")
+    named = {f"{c.name} [{c.unit}]" if units else c.name: c.values for c in channels}
+    table = pd.DataFrame(named, index=index)
     table.attrs["units"] = {"time": "s", **{c.name: c.unit for c in channels}}
     return table
 

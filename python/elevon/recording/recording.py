@@ -217,11 +217,14 @@ class Recording(ChannelSet):
             and all(self[name].equals(other[name]) for name in self.names)
         )
 
-    def to_pandas(self, clock: str | None = None) -> "pd.DataFrame":
-        """Return one clock's channels as a table indexed by time (s); units in ``attrs``."""
+    def to_pandas(self, clock: str | None = None, *, units: bool = False) -> "pd.DataFrame":
+        """Return one clock's channels as a table indexed by time (s); units in ``attrs``.
+
+        With `units` they also stand in the columns' names: ``output_position [rad]``.
+        """
         from elevon.recording.convert import to_pandas
 
-        return to_pandas(self, clock)
+        return to_pandas(self, clock, units=units)
 
     def to_xarray(self) -> "xr.Dataset":
         """Return all channels as a dataset, one time dimension a clock, units as attributes.

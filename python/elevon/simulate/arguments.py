@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from elevon.actuator import Actuator
 from elevon.errors import ArgumentTypeError, InputError
+from elevon.faults import Fault
 from elevon.scenario import Scenario
 
 ActuatorLike = Actuator | str | os.PathLike[str]
@@ -32,6 +33,25 @@ def as_actuator(given: ActuatorLike, place: str = "actuator") -> Actuator:
         f"{place}: {_kind(given)} is no actuator; expected an Actuator, a name "
         "('torino-rotary') or the path of a TOML file"
     )
+
+
+def changed(
+    scenario: Scenario, duration: str | float | None, faults: Sequence[Fault | str]
+) -> Scenario:
+    """Return a scenario of another duration, if any is given, and with further faults.
+
+    Raises
+    ------
+    ArgumentTypeError
+        The faults are one text, not a list of them.
+    InputError
+        A duration or a fault that cannot be.
+    """
+    if isinstance(faults, (str, Fault)):
+        raise ArgumentTypeError(f"faults: {faults!r} is one fault; expected a list: [{faults!r}]")
+    if duration is not None:
+        scenario = scenario.replaced(duration=duration)
+    return scenario.with_faults(faults) if faults else scenario
 
 
 def as_scenario(given: ScenarioLike, actuator: Actuator, place: str = "scenario") -> Scenario:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrupted
+from elevon.faults import Fault
 from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
 from elevon.simulate.acting import report
-from elevon.simulate.arguments import ActuatorLike, ScenarioLike
+from elevon.simulate.arguments import ActuatorLike, ScenarioLike, changed
 from elevon.simulate.prepare import Features, Prepared, Record, Run, prepare, prepare_named
 from elevon.simulate.result import build_recording
 
@@ -21,6 +23,8 @@ def simulate(
     actuator: ActuatorLike,
     scenario: ScenarioLike = None,
     *,
+    duration: str | float | None = None,
+    faults: Sequence[Fault | str] = (),
     fidelity: str = "high",
     record: Record = None,
     features: Features = None,
@@ -39,11 +43,15 @@ def simulate(
     scenario : Scenario, mapping, path or None
         Command, loads, faults and duration: a `Scenario`, a mapping of the
         same form as the file, or a file. None: the actuator's own default scenario.
+    duration : str or float, optional
+        In place of the scenario's: s, or a text with its unit.
+    faults : sequence of Fault or str
+        Beside the scenario's own, such as ``["backlash@transmission=1 deg"]``.
     fidelity : str
         ``high`` or ``low``.
     record : str or sequence of str, optional
-        What is kept, such as ``"output_position,motor_speed@400 Hz"``; see `record_plan`. Empty,
-        with `features`: nothing.
+        What is kept, such as ``["output_position", "motor_speed"]`` or ``"current_q@4 kHz"``; see
+        `record_plan`. Empty, with `features`: nothing.
     features : str or sequence of str, optional
         Features computed while simulating, such as ``"all@400 Hz"``; see `elevon.features`. They
         stand in ``meta["features"]`` (SI; None where the motion gives none) and their units in
@@ -82,6 +90,8 @@ def simulate(
         The core questions the values together.
     """
     run = Run(actuator, scenario, seed, number=number)
+    if duration is not None or faults:
+        run = replace(run, scenario=changed(run.scenario, duration, faults))
     prepared = [prepare(run, fidelity, record, features)]
     report([prepared[0].notices], strict=strict)
     recording = _simulated(
