@@ -153,6 +153,14 @@ def save_figure(
     return write_bytes(target, data, force=force)
 
 
+def on_white(drawing: str) -> str:
+    """Return an SVG element as a picture of its own: dark ink on white, on any page."""
+    dark = drawing.replace("<svg ", '<svg color="#1f2630" ', 1)
+    return re.sub(
+        r"(<svg[^>]*>)", r'\1<rect width="100%" height="100%" fill="#ffffff"/>', dark, count=1
+    )
+
+
 def _svg_text(figure: Figure, name: str, **options: Any) -> str:
     stream = io.StringIO()
     with _style(**{"svg.hashsalt": name, "svg.id": None}):

@@ -249,7 +249,7 @@ def _finish(demo: LifeDemo, *, force: bool) -> None:
     from elevon.demo.life.figures import cone_figure
     from elevon.demo.life.page import life_report, moving_picture
     from elevon.files import write_text
-    from elevon.report.figures import save_figure
+    from elevon.report.figures import on_white, save_figure
 
     write_text(demo.folder / "mission.toml", mission_file().read_text("utf-8"), force=True)
     truth = {
@@ -261,6 +261,6 @@ def _finish(demo: LifeDemo, *, force: bool) -> None:
     write_text(demo.folder / "truth.json", json.dumps(truth) + "\n", force=True)
     report = demo.timed("drawing the page", lambda: life_report(demo))
     save_figure(cone_figure(demo), demo.folder / "cone.svg", force=True)
-    write_text(demo.folder / "mechanism.svg", str(moving_picture(demo)), force=True)
+    write_text(demo.folder / "mechanism.svg", on_white(moving_picture(demo)), force=True)
     # Last: where it stands, the demonstration is complete.
     report.save(demo.folder / "report.html", force=force)

@@ -1,0 +1,63 @@
+"""The guide reads easily: length, words a sentence, no seed numbers; what its pages show runs."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from newcomer import Block, blocks_of, matches, run_page, shortened  # noqa: E402
+from prose import MOST_LINES, MOST_WORDS, guide_pages, measured  # noqa: E402
+
+
+@pytest.mark.parametrize("path", guide_pages(), ids=lambda path: path.stem)
+def test_a_page_of_the_guide(path):
+    page = measured(path.read_text("utf-8"))
+    assert page.lines <= MOST_LINES
+    assert page.pace < MOST_WORDS
+    assert not page.seeds
+
+
+def test_the_readme_is_short():
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert text.count("\n") <= 120
+    assert measured(text).pace < MOST_WORDS
+
+
+def test_what_is_measured():
+    text = (
+        "# A heading of many words\n\nOne two three. Four 0.5 five!\n\n* an item\n"
+        "* another [link](x.md)\n\n| a table | of words |\n\n```sh\nelevon --seed 3\n```\n"
+    )
+    page = measured(text)
+    assert (page.sentences, page.words) == (4, 3 + 3 + 2 + 2)
+    assert page.seeds == ("--seed 3",)
+
+
+def test_a_page_that_prints_something_else_is_found(tmp_path):
+    """Wrong output, wrong exit codes: neither passes; what varies is left out."""
+    (block,) = blocks_of("```sh\necho a 1.5 s\n```\n\n```text\na ... s\n...\n```\n")
+    assert block.expected == "a ... s\n...\n"
+    block.printed = "a 1.5 s\nmore\n"
+    assert matches(block)
+    block.printed = "b 1.5 s\n"
+    assert not matches(block)
+    assert shortened(Block("sh", "", "", printed="x" * 200)).endswith("x...\n")
+
+
+@pytest.mark.parametrize(("body", "wrong"), [("echo one\n", 0), ("echo two\n", 1), ("false\n", 1)])
+def test_blocks_are_run(body, wrong, tmp_path, monkeypatch):
+    monkeypatch.setattr("newcomer.ROOT", tmp_path)
+    (tmp_path / "examples").mkdir()
+    page = tmp_path / "page.md"
+    page.write_text(f"```sh\n{body}```\n\n```text\none\n```\n", "utf-8")
+    assert run_page(page, Path(sys.executable).parent) == wrong
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("path", [ROOT / "README.md", *guide_pages()], ids=lambda path: path.stem)
+def test_the_newcomer(path):
+    """Each block runs in a fresh folder and home, and prints what the page shows."""
+    assert run_page(path, Path(sys.executable).parent) == 0
