@@ -1,4 +1,4 @@
-"""Run the commands behind the evidence: `python tools/evidence.py [NAME ...]` keeps what they wrote.
+"""Run the commands behind the evidence, keep what they wrote: `python tools/evidence.py [NAME]`.
 
 Each record, docs/evidence/runs/NAME.json, has the command, the day, the commit and the checks as
 the command printed them. `make docs` makes the pages of them; `--check` runs the commands again

@@ -1,4 +1,4 @@
-"""Play a newcomer: run each block of README and of the guide in a fresh folder and home.
+"""Be a newcomer: run each block of README and of the guide in a fresh folder and home.
 
     python tools/newcomer.py                      every page, with the `elevon` of this environment
     python tools/newcomer.py docs/how-to/bench.md --write    put what was printed into the page
