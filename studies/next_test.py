@@ -224,8 +224,8 @@ class _Bench:
         from elevon.bench.rig import setups
         from elevon.bench.traces import recorded
         from elevon.bench.virtual import traced
-        from elevon.diagnose.engine.replay import logged_features
         from elevon.diagnose.positions.log import prepared
+        from elevon.diagnose.positions.reading import logged_features
         from elevon.diagnose.surrogate.population import day_of
         from elevon.scenario.compile import signal_records
         from elevon.simulate import Run, simulate_batch

@@ -126,7 +126,7 @@ def _block_rows(
     baselines: Sequence[Log],
     progress: Progress | None,
 ) -> Iterator[Row]:
-    from elevon.diagnose.engine import diagnose
+    from elevon.diagnose.by_model import diagnose
 
     with tempfile.TemporaryDirectory() as folder:
         trials = [p.trial for p in block]

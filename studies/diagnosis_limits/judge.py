@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from elevon.diagnose.engine import Cause, Diagnosis
+    from elevon.diagnose.engine.answer import Cause, Diagnosis
 
 __all__ = ["Injected", "Row", "judged"]
 

@@ -279,18 +279,13 @@ def _spread(items: Sequence[int], count: int) -> list[int]:
 
 def _over(actuator: Actuator, row: Limit) -> float:
     """Twice the limit, within the catalogue's range; what is there or not is there."""
-    from elevon import _core
-    from elevon.diagnose.roles.candidates import switched_of
+    from elevon.faults import find_record
 
-    record = next(
-        r
-        for r in _core.faults(actuator.wiring)
-        if r["kind"] == row.kind and row.place in r["places"]
-    )
-    if record["whole"] or row.kind in switched_of(actuator):
+    record = find_record(row.kind, row.place, actuator.wiring)
+    if record.whole or record.switched:
         return _WHOLE
     assert row.limit is not None
-    return float(min(OVER * row.limit, record["maximum"]))
+    return min(OVER * row.limit, record.maximum)
 
 
 def _judged(row: Limit, severity: float, answer: Diagnosis) -> Limit:

@@ -126,7 +126,7 @@ def day_logs(
 
 def _of_day(actuator: Actuator, day: Day) -> Actuator:
     from elevon.diagnose.engine.candidates import of_a_magnet
-    from elevon.diagnose.roles.spread import drawn
+    from elevon.diagnose.engine.days import drawn
 
     return drawn(of_a_magnet(actuator), np.random.default_rng([day.seed, 16]))
 
@@ -177,10 +177,7 @@ def diagnosed(
     actuator: Actuator, log: Log, baselines: Sequence[Log], faults: Sequence[str] | None = None
 ) -> Diagnosis:
     """Return the diagnosis of one log as `elevon diagnose` makes it."""
-    from elevon.diagnose.engine import diagnose
-    from elevon.diagnose.roles import diagnose_by_roles
+    from elevon.diagnose.by_model import diagnose
 
-    if stand_of(actuator.wiring).equipment == _POSITION:
-        return diagnose([log], actuator, baselines=baselines, faults=faults)
     named = [replace(item, name=f"baseline {k + 1}") for k, item in enumerate(baselines)]
-    return diagnose_by_roles([log], actuator, baselines=named, faults=faults)
+    return diagnose([log], actuator, baselines=named, faults=faults)

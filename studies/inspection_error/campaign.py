@@ -168,7 +168,7 @@ def _inspected(
     number: int, group: Sequence[DayVisit], bench: _Bench, logs: Sequence[Log]
 ) -> Inspected:
     """Diagnose logs of one severity together; they are of the days of a group of visits."""
-    from elevon.diagnose.engine import diagnose
+    from elevon.diagnose.by_model import diagnose
 
     visit = group[0]
     laws = [LAWS[fault.law] for fault in FAULTS]

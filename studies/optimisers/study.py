@@ -270,7 +270,7 @@ def _one(
 
 
 def _ours(unit: Actuator, log: Log, base: Log) -> dict[str, Callable[[], Diagnosis]]:
-    from elevon.diagnose.engine import diagnose
+    from elevon.diagnose.by_model import diagnose
     from elevon.diagnose.surrogate import diagnose_by_both, diagnose_by_surrogate
 
     ways = dict(zip(OURS, (diagnose, diagnose_by_both, diagnose_by_surrogate), strict=True))
@@ -282,14 +282,9 @@ def _model_runs(unit: Actuator, log: Log) -> int:
     """Runs of the reduced-order model that diagnosis by the model makes for one log."""
     from elevon.diagnose.engine.candidates import chosen
     from elevon.diagnose.engine.replay import replay
-    from elevon.diagnose.positions.log import prepared
+    from elevon.diagnose.positions.reading import PositionReading
 
-    recordings = replay(prepared(log, unit), unit, chosen(list(CAUSES)))
-    return (
-        1
-        + len(recordings.draws)
-        + sum(int((s != 0.0).sum()) for s in recordings.severities.values())
-    )
+    return replay(PositionReading(log, unit), chosen(list(CAUSES))).runs
 
 
 def _named(result: Diagnosis) -> dict[str, float]:

@@ -71,7 +71,7 @@ ANSWERS = {
                  r"^torino-rotary: (not )?(passed|measured)",
                  LOGS, False),
     "diagnose": (("log/log.csv", *ROTARY, "--baseline", "base/log.csv"),
-                 r"^(Nothing here|No candidate|Something|\w+)", LOGS, True),
+                 r"^(HEALTHY \(p = |FAULTY: |UNKNOWN FAULT: |MODEL DOES NOT FIT: )", LOGS, True),
     "monitor": (("watch/log.csv", *ROTARY, "--baseline", "watch/log.csv", "--window", "2 s"),
                 r"^(No alarm|Alarm at)", (WATCH,), True),
     "next-test": (ROTARY, r"bit", (), True),

@@ -11,9 +11,7 @@ from typing import Any
 import pytest
 
 from elevon import _core
-from elevon.bench.stand import stand_of
-from elevon.diagnose.engine.candidates import CANDIDATES
-from elevon.diagnose.roles.candidates import candidates_of, counted_of, switched_of
+from elevon.diagnose.engine.candidates import candidates_of
 from elevon.units import parse_quantity
 from studies.fault_limits.standard import Day, StandardTest, day_logs, diagnosed, standard_tests
 from tests.contract import shipped
@@ -29,11 +27,9 @@ def every(count: int | None, name: str) -> list[Any]:
     return list(known if count is None else known[:: max(1, len(known) // count)][:count])
 
 
-def severities(name: str, fault: Any, parts: tuple[float, ...]) -> tuple[float, ...]:
+def severities(fault: Any, parts: tuple[float, ...]) -> tuple[float, ...]:
     """What is there or not is there; the rest at parts of the largest."""
-    actuator = shipped.actuator(name)
-    there = fault.kind in counted_of(actuator) | switched_of(actuator)
-    return (1.0,) if there else tuple(part * fault.high for part in parts)
+    return (1.0,) if fault.whole else tuple(part * fault.high for part in parts)
 
 
 def missed(
@@ -42,7 +38,7 @@ def missed(
     """Faults that are neither named, nor ambiguous with a named one, nor reported as unseen."""
     actuator = shipped.actuator(name)
     chosen = [f.key for f in faults] if limited else None
-    wanted = [(f, s) for f in faults for s in severities(name, f, parts)]
+    wanted = [(f, s) for f in faults for s in severities(f, parts)]
     days = [Day((f.text(s),), 10 + k) for k, (f, s) in enumerate(wanted)]
     baseline, *logs = day_logs(actuator, test, [Day((), 1), *days])
     out = []
@@ -72,15 +68,9 @@ def halved(test: StandardTest) -> StandardTest:
 def test_some_faults_are_found_or_reported_as_unseen(name: str) -> None:
     """The largest severity of a few faults of the catalogue, in half of one test."""
     test = halved(standard_tests(shipped.actuator(name))[0])
-    able = [fault for fault in every(None, name) if is_candidate(name, fault.key)]
+    able = every(None, name)
     few = able[:: max(1, len(able) // 3)][:3]
     assert missed(name, test, few, PARTS[:1], limited=True) == []
-
-
-def is_candidate(name: str, key: str) -> bool:
-    """Whether a fault is a candidate of an actuator's diagnosis; the long test requests all."""
-    by_model = stand_of(shipped.actuator(name).wiring).equipment == "rotary"
-    return not by_model or key in {c.key for c in CANDIDATES}
 
 
 @pytest.mark.long
@@ -108,7 +98,7 @@ def test_every_fault_of_the_catalogue_is_a_candidate_or_reported_as_unseen(name:
     covered = {(i["kind"], i["place"]) for i in answer.unobservable if i["reason"]}
     for key in answer.detectable:
         kind, _, place = key.partition("@")
-        same = next(c.same for c in candidates_of(actuator) if c.key == key)
-        covered |= {(kind, p) for p in (place, *same)}
+        c = next(c for c in candidates_of(actuator) if c.key == key)
+        covered |= {*((kind, p) for p in (place, *c.same)), *c.ambiguous}
     whole = {(r["kind"], p) for r in _core.faults(actuator.wiring) for p in r["places"]}
     assert whole - covered == set()

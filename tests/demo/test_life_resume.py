@@ -68,7 +68,7 @@ class Story:
             "elevon.calibrate.calibrate": self.calibrate,
             "elevon.calibrate.write.write_calibration": self.write,
             "elevon.demo.life.run.respond": self.step("tables", tables()),
-            "elevon.diagnose.engine.diagnose": self.diagnose,
+            "elevon.diagnose.by_model.diagnose": self.diagnose,
             "elevon.demo.life.page.life_report": self.step("report", Report("life")),
             "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",
             "elevon.demo.life.figures.cone_figure": lambda _demo: None,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elevon.diagnose.engine import diagnose
+from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.detection import Detector
@@ -11,8 +11,10 @@ from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.diagnose.engine.healthy import healthy
 from elevon.diagnose.engine.not_modelled import not_modelled
 from elevon.diagnose.engine.replay import Replay
+from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.engine.words import sentence
-from elevon.diagnose.positions.features import FeatureVector
+from elevon.diagnose.positions.features import FEATURES
+from elevon.diagnose.positions.reading import BRAKE_UNKNOWN
 from elevon.errors import InputError
 from elevon.faults import catalogue
 from studies.diagnosis_limits.campaign import calibrated
@@ -32,10 +34,11 @@ def _case(values, baselines=(), *, brake_unknown=False):
     moved[:, 0] = grid / 0.01
     std = np.full(len(NAMES), 1e-3)
     model = Replay(
-        FeatureVector(NAMES, np.ones(5), std), {BACKLASH.key: grid}, {BACKLASH.key: moved}, draws
-    )
+        FeatureVector(NAMES, np.ones(5), std), {BACKLASH.key: grid}, {BACKLASH.key: moved},
+        BRAKE_UNKNOWN if brake_unknown else FEATURES, draws.mean(axis=0), np.cov(draws.T), 10.0,
+    )  # fmt: skip
     logs = [FeatureVector(NAMES, np.array(values), std) for values in baselines]
-    unit = healthy(model, NAMES, logs, brake_unknown=brake_unknown)
+    unit = healthy(model, NAMES, logs)
     return LogCase("log", FeatureVector(NAMES, np.array(values), std), unit, model)
 
 
@@ -49,16 +52,16 @@ def test_each_fault_of_the_catalogue_is_candidate_ambiguous_or_not_modelled_once
 
 def test_something_else_is_distinguished_from_the_candidates():
     base = [[1.0] * 5]
-    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05, other=True)
+    other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05)
     assert (other.status, other.best) == ("faulty", ())
     assert other.p_other > 0.9
     assert other.p_fault > 0.9
     assert "none of the candidates" in sentence(other)
     assert any("no candidate explains" in text for text in other.findings)
-    backlash = answer_of([_case([1.5, 1, 1, 1, 1], base)], [BACKLASH], 0.05, other=True)
+    backlash = answer_of([_case([1.5, 1, 1, 1, 1], base)], [BACKLASH], 0.05)
     assert backlash.best == (BACKLASH.key,)
     assert backlash.p_other < 0.01
-    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [BACKLASH], 0.05, other=True)
+    well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [BACKLASH], 0.05)
     assert well.status == "healthy"
     assert well.p_other < 0.01
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.diagnose.engine import diagnose
+from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.candidates import CANDIDATES, chosen
 from elevon.diagnose.engine.case import case_of, detector_of
 from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.posterior import marginals, posterior, quantiles
 from elevon.diagnose.engine.replay import _RECENT, replay
-from elevon.diagnose.positions.log import prepared
+from elevon.diagnose.positions.reading import PositionReading
 from elevon.errors import InputError, UnknownNameError
 from elevon.logs.read import read_logs
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
@@ -130,10 +130,10 @@ def test_an_eccentric_rotor_is_one_of_a_periodic_flux(unit, fidelity):
 
 
 def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs):
-    item = prepared(read_logs([logs["base"]])[0], unit)
+    item = PositionReading(read_logs([logs["base"]])[0], unit)
     turning = next(c for c in CANDIDATES if c.kind == "eccentricity_dynamic")
     sensor = next(c for c in CANDIDATES if c.place == "sensor.current_a")
-    model = replay(item, unit, [turning, sensor])
+    model = replay(item, [turning, sensor])
     names = np.array(model.healthy.names)
     moved = model.shift(turning.key, np.array([0.3]))[0]
     assert set(names[moved != 0.0]) == {"current_sideband", "voltage_sideband"}
@@ -159,25 +159,26 @@ def test_an_answer_does_not_depend_on_what_was_asked_before(unit, logs, baseline
 
 
 def test_the_runs_of_a_baseline_stand_about_the_logs_own_healthy_run(unit, logs):
-    item, base = (prepared(*read_logs([logs[n]]), unit) for n in ("healthy", "base"))
+    item, base = (PositionReading(*read_logs([logs[n]]), unit) for n in ("healthy", "base"))
     few = chosen(FEW)
     lent, direct, theirs = (
-        replay(item, unit, few, [base]),
-        replay(item, unit, few),
-        replay(base, unit, few),
+        replay(item, few, [base]),
+        replay(item, few),
+        replay(base, few),
     )
     np.testing.assert_array_equal(lent.healthy.values, direct.healthy.values)
     np.testing.assert_array_equal(lent.shifts[FEW[0]], theirs.shifts[FEW[0]])
+    np.testing.assert_array_equal(lent.spread, theirs.spread)
     np.testing.assert_allclose(
-        lent.draws - lent.healthy.values, theirs.draws - theirs.healthy.values, rtol=0.0, atol=1e-12
+        lent.mean - lent.healthy.values, theirs.mean - theirs.healthy.values, rtol=0.0, atol=1e-12
     )
     assert (lent.healthy.values != theirs.healthy.values).any()
 
 
 def test_what_moves_next_to_nothing_gives_the_detector_no_direction(unit, logs):
-    item = prepared(*read_logs([logs["healthy"]]), unit)
+    item = PositionReading(*read_logs([logs["healthy"]]), unit)
     every = chosen([*FEW, "sag@supply"])
-    case = case_of(item, unit, every, [])
+    case = case_of(item, every, [])
     root = np.linalg.inv(np.linalg.cholesky(case.covariance))
     at = case.model.severities["sag@supply"][1:]
     size = np.linalg.norm(case.shift("sag@supply", at) @ root.T, axis=1)
@@ -219,7 +220,7 @@ def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
 
 def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
     """The page's signals: the healthy model misses the log's backlash, the named one does not."""
-    from elevon.diagnose.engine.traces import traces_of
+    from elevon.diagnose.by_model import traces_of
 
     items = read_logs([logs["backlash"]])
     result = diagnose(items, unit, baselines=read_logs([logs["base"]]), faults=FEW)
@@ -264,8 +265,6 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
     )  # fmt: skip
     with pytest.raises(InputError, match="can be used"):
         answer(unit, gaps)
-    with pytest.raises(InputError, match="rotary"):
-        answer(Actuator.load("nasa-ballscrew"), logs["healthy"])
     with pytest.raises(UnknownNameError):
         answer(unit, logs["healthy"], faults=["backlash@moon"])
     with pytest.raises(InputError, match="not modelled: with it"):

@@ -8,7 +8,7 @@ from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.engine.case import case_of
 from elevon.diagnose.engine.likelihood import Frame, one_fault, prior_density, two_faults
 from elevon.diagnose.engine.posterior import quantiles
-from elevon.diagnose.positions.log import prepared
+from elevon.diagnose.positions.reading import PositionReading
 from tests.diagnose.virtual import bench_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
@@ -28,11 +28,11 @@ def frames():
     """One frame for each set of faults, and the candidates in it."""
     unit = Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
     made = bench_logs(unit, [(1, [])] + [(k + 2, f) for k, f in enumerate(FAULTS.values())])
-    base = prepared(made[0], unit)
+    base = PositionReading(made[0], unit)
     out = {}
     for (name, texts), item in zip(FAULTS.items(), made[1:], strict=True):
         few = [KNOWN[text.partition("=")[0]] for text in texts]
-        case = case_of(prepared(item, unit), unit, CANDIDATES, [base])
+        case = case_of(PositionReading(item, unit), CANDIDATES, [base])
         residual = case.features.values - case.unit.mean
         frame = Frame(
             residual, case.covariance, case.unit.degrees, case.shift, case.errors, case.uncertainty

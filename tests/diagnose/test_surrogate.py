@@ -8,7 +8,7 @@ import pytest
 
 from elevon import Actuator
 from elevon.diagnose.engine.candidates import CANDIDATES
-from elevon.diagnose.positions.features import UNITS, features_of, median
+from elevon.diagnose.positions.features import FEATURES, features_of, median
 from elevon.diagnose.positions.lost_motion import carried
 from elevon.diagnose.surrogate import (
     Surrogate,
@@ -65,7 +65,7 @@ def test_sizes_and_severities_are_inverse():
 
 def test_features_are_the_evidence_and_the_position_gain(unit, logs):
     features = log_features(logs["healthy"], unit)
-    assert set(NAMES) <= set(UNITS)
+    assert set(NAMES) <= set(FEATURES)
     values = dict(zip(NAMES, features.values, strict=True))
     assert values["lost_motion"] == pytest.approx(unit.parameters.value("backlash.total"), rel=0.01)
     gain = unit.parameters.value("control.position_gain")

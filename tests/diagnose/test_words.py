@@ -1,9 +1,11 @@
 """A diagnosis as a person says it."""
 
+from dataclasses import replace
+
 import pytest
 
-from elevon.diagnose.engine.answer import Cause, Diagnosis
-from elevon.diagnose.engine.words import sentence, severity_text
+from elevon.diagnose.engine.answer import Cause, Diagnosis, FaultPlace, Reason
+from elevon.diagnose.engine.words import folded, sentence, severity_text, verdict
 
 
 @pytest.mark.parametrize(
@@ -33,3 +35,27 @@ def test_a_fault_without_words_of_its_own_is_said_by_kind_and_place():
     assert sentence(named("brake_dragging", "brake", "N m")).startswith(
         "The brake drags with 0.2 N m (0.1 to 0.3 N m);"
     )
+
+
+def test_the_first_line_is_the_answer():
+    worn = named("backlash", "transmission", "m", 3e-4)
+    assert verdict(worn) == "FAULTY: backlash +0.30 mm (0.15 to 0.45), p = 0.98"
+    well = replace(worn, status="healthy", best=(), faults=(), p_fault=0.03)
+    assert verdict(well) == "HEALTHY (p = 0.97)"
+    reason = Reason("dry_current", 0.5, 0.2)
+    assert verdict(replace(well, status="model_does_not_fit", reason=reason)).startswith(
+        "MODEL DOES NOT FIT: dry_current (current that changes sign with the motion) is 0.5, at "
+    )
+    unknown = verdict(replace(well, status="unknown_fault", p_fault=0.9, reason=reason))
+    assert unknown.startswith("UNKNOWN FAULT: dry_current")
+    assert unknown.endswith("p = 0.90")
+
+
+def test_places_that_are_alike_are_one_word():
+    short = named("short", "motor.phase_a").faults[0]
+    phases = tuple(FaultPlace("short", f"motor.phase_{p}") for p in "bc")
+    sensor = FaultPlace("gain", "sensor.current_a")
+    assert folded(replace(short, ambiguous_with=(*phases, sensor))) == [
+        "any phase", "gain@sensor.current_a",
+    ]  # fmt: skip
+    assert folded(replace(short, ambiguous_with=phases[:1])) == ["short@motor.phase_b"]

@@ -62,7 +62,7 @@ def diagnose(
 
 
 def _print(result: Diagnosis) -> None:
-    from elevon.diagnose.engine.words import by_reason
+    from elevon.diagnose.engine.words import by_reason, folded, sentence
 
     answer(result.headline)
     rows = [
@@ -70,10 +70,10 @@ def _print(result: Diagnosis) -> None:
             f"{c.kind}@{c.place}",
             f"{c.probability:.3f}",
             *severity_texts(c.severity, c.interval, c.unit),
-            ", ".join(name.key for name in c.ambiguous_with),
+            ", ".join(folded(c)),
         )
         for c in result.faults
     ]
     print_table(("cause", "probability", "severity", "low", "high", "ambiguous with"), rows)
-    listed(result.findings)
-    listed([f"not observable: {n}: {reason}" for n, reason in by_reason(result.unobservable)])
+    unseen = [f"not observable: {n}: {reason}" for n, reason in by_reason(result.unobservable)]
+    listed([*result.findings, sentence(result), *unseen])

@@ -7,19 +7,19 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from elevon.calibrate.ways import turns
+from elevon.diagnose.by_model import diagnose as by_model
+from elevon.diagnose.by_model import traces_of
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.monitor.answer import Monitoring
 from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor
 from elevon.errors import InputError, unknown
-from elevon.logs.drive import drive_log
 from elevon.logs.read import as_logs
 from elevon.simulate.arguments import as_actuator
 
 if TYPE_CHECKING:
-    from elevon.actuator import Actuator
     from elevon.diagnose.surrogate import Surrogate
     from elevon.logs.log import Log
     from elevon.logs.read import LogsLike
@@ -67,14 +67,12 @@ def diagnose(
     run = _method(method, surrogate)
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
-    by_positions = turns(model)
-    if method != "model" and not by_positions:
+    if method != "model" and not turns(model):
         raise InputError(f"--method {method}: serves turning outputs; {model.name} has none")
     data, healthy = as_logs(logs), _healthy(baselines)
-    if by_positions:
-        result = _by_model(run, data, model, healthy, faults=faults, false_alarm=false_alarm)
-        return replace(result, method=method)
-    return _by_roles(data, model, healthy, faults=faults, false_alarm=false_alarm)
+    result = run(data, model, baselines=healthy, faults=faults, false_alarm=false_alarm)
+    draw = partial(traces_of, data, model, result)
+    return replace(result, actuator=model.name, method=method, draw=draw)
 
 
 def _healthy(baselines: LogsLike) -> list[Log]:
@@ -89,8 +87,6 @@ def _method(
     if method not in METHODS:
         raise unknown("method", method, METHODS, "--method")
     if method == "model":
-        from elevon.diagnose.engine import diagnose as by_model
-
         if given is not None:
             raise InputError("--surrogate: serves --method surrogate and both")
         return by_model
@@ -105,30 +101,6 @@ def _method(
         given = shipped() if given is None else Surrogate.load(given)
     by = diagnose_by_surrogate if method == "surrogate" else diagnose_by_both
     return partial(by, surrogate=given)
-
-
-def _by_model(
-    run: Callable[..., Diagnosis],
-    logs: Sequence[Log],
-    model: Actuator,
-    baselines: Sequence[Log],
-    **options: Any,
-) -> Diagnosis:
-    from elevon.diagnose.engine.traces import traces_of
-
-    data = [drive_log(log) for log in logs]
-    result = run(data, model, baselines=[drive_log(log) for log in baselines], **options)
-    return replace(result, actuator=model.name, draw=partial(traces_of, data, model, result))
-
-
-def _by_roles(
-    logs: Sequence[Log], model: Actuator, baselines: Sequence[Log], **options: Any
-) -> Diagnosis:
-    from elevon.diagnose.roles import diagnose_by_roles
-    from elevon.diagnose.roles.traces import traces_by_roles
-
-    result = diagnose_by_roles(logs, model, baselines=baselines, **options)
-    return replace(result, actuator=model.name, draw=partial(traces_by_roles, logs, model, result))
 
 
 def monitor(

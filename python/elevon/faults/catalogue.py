@@ -35,6 +35,8 @@ class FaultRecord:
     fidelities: tuple[str, ...]
     not_modelled: Mapping[str, str] = field(default_factory=dict)
     targets: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    whole: bool = False
+    switched: bool = False
 
     @property
     def range_text(self) -> str:
@@ -104,6 +106,8 @@ def catalogue(wiring: str) -> tuple[FaultRecord, ...]:
             fidelities=tuple(item["fidelities"]),
             not_modelled=item["not_modelled"],
             targets={place: tuple(paths) for place, paths in item["targets"].items()},
+            whole=bool(item["whole"]),
+            switched=item["effect"].startswith("1: "),
         )
         for item in _core.faults(wiring)
     )

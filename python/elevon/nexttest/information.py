@@ -13,8 +13,8 @@ from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
 from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.healthy import healthy
 from elevon.diagnose.engine.likelihood import Frame
-from elevon.diagnose.engine.replay import logged_features, replay
-from elevon.diagnose.positions.log import prepared
+from elevon.diagnose.engine.replay import replay
+from elevon.diagnose.positions.reading import PositionReading
 from elevon.nexttest.belief import Belief, Possible
 
 if TYPE_CHECKING:
@@ -45,11 +45,10 @@ def planned(
     record = recorded(list(signal_records(actuator.wiring, "low")))
     run = Run(setup.actuator, setup.scenario)
     recording = simulate_batch([run], fidelity="low", record=record)[0]
-    item = prepared(traced(setup, recording), actuator)
-    model = replay(item, actuator, candidates)
-    logged = logged_features(item, actuator)
-    names = [n for n in logged.names if n in model.healthy.names]
-    logged = logged.only(names)
+    item = PositionReading(traced(setup, recording), actuator)
+    model = replay(item, candidates)
+    names = [n for n in item.features.names if n in model.healthy.names]
+    logged = item.features.only(names)
     unit = healthy(model, names, [logged] if profile.standard else [])
     return LogCase(profile.name, replace(logged, values=unit.mean), unit, model)
 

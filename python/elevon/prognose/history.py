@@ -29,7 +29,7 @@ from elevon.prognose.predict import check_order
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.engine import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
     from elevon.logs.log import Log
     from elevon.prognose.law import Law
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from elevon.calibrate.outcome import Calibration
 from elevon.demo.steps import Story
-from elevon.diagnose.engine import Diagnosis
+from elevon.diagnose.engine.answer import Diagnosis
 from elevon.prognose import Inspection, Prognosis, ResponseTables
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy

@@ -210,7 +210,7 @@ def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
 
 
 def _visit(demo: LifeDemo, baselines: list[Log], flt: Any, usage: float, number: int) -> None:
-    from elevon.diagnose.engine import diagnose
+    from elevon.diagnose.by_model import diagnose
     from elevon.logs.read import read_drive_logs
     from elevon.prognose.history import write_stamp
     from elevon.prognose.observation import inspection

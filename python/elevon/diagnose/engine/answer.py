@@ -224,10 +224,10 @@ class Diagnosis(Result):
 
     @property
     def headline(self) -> str:
-        """The answer in one sentence."""
-        from elevon.diagnose.engine.words import sentence
+        """The answer in one line."""
+        from elevon.diagnose.engine.words import verdict
 
-        return sentence(self)
+        return verdict(self)
 
     def plot(self) -> Figure:
         """Return how far each feature deviates from a healthy unit."""

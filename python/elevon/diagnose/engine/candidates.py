@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.not_modelled import not_modelled
 from elevon.errors import InputError, unknown
+from elevon.faults import FaultRecord, catalogue
+from elevon.simulate.own_faults import own_faults
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+
 
 _LAW = "motor.eccentricity_law"
 
@@ -42,6 +47,8 @@ class CandidateFault:
         Faults that are no candidates themselves: in closed form they move the same features.
     switched : bool
         Whether it is there or not: it acts in full from one half on.
+    whole : bool
+        Whether it is that, or counted.
     """
 
     kind: str
@@ -56,6 +63,7 @@ class CandidateFault:
     known_features: tuple[str, ...] = ()
     ambiguous: tuple[tuple[str, str], ...] = ()
     switched: bool = False
+    whole: bool = False
 
     @property
     def key(self) -> str:
@@ -115,8 +123,80 @@ CANDIDATES: tuple[CandidateFault, ...] = (
 )  # fmt: skip
 
 
-def chosen(texts: Sequence[str] | None) -> tuple[CandidateFault, ...]:
+#: Of an actuator that has no table of its own. Largest severity considered where the catalogue's
+#: own is larger or none, by unit: what a unit of this size runs with at all; shares and counts are
+#: given by the catalogue. Rates and errors are alike for all. ASSUMED.
+_MOST = {"m": 0.002, "rad": 0.3, "N": 5000.0, "kg m2": 4e-4, "A": 2.0, "N m": 1.0}
+_COUNTED = 8.0  # of what is counted
+_SHARE = 2.0  # of a share that the catalogue lets grow without bound
+_RATE, _ERROR = 1e-5, 0.1  # per hour; of a shift
+
+
+def candidates_of(actuator: Actuator) -> tuple[CandidateFault, ...]:
+    """Return the faults that an actuator may have, one for places that differ by a phase only.
+
+    A turning servo's are `CANDIDATES`; of any other all of its catalogue that the reduced-order
+    model has.
+    """
+    if turns(actuator):
+        return CANDIDATES
+    # Ranges end where the unit's own numbers make a whole severity impossible.
+    most = {(r.kind, place): r.maximum for r in own_faults(actuator) for place in r.places}
+    records = [record for record in catalogue(actuator.wiring) if "low" in record.fidelities]
+    return tuple(
+        _candidate(replace(r, maximum=most.get((r.kind, group[0]), r.maximum)), group)
+        for r in records
+        for group in _groups(r.places)
+    )
+
+
+def not_candidates(actuator: Actuator) -> tuple[dict[str, str], ...]:
+    """Return kind, place and reason of each fault of the catalogue that is no candidate."""
+    if turns(actuator):
+        return not_modelled()
+    return tuple(
+        {"kind": record.kind, "place": place, "reason": f"reduced-order model: {reason}"}
+        for record in catalogue(actuator.wiring)
+        if "low" not in record.fidelities
+        for place in record.places
+        for reason in [record.not_modelled.get("low", "does not have it")]
+    )
+
+
+def _groups(places: Sequence[str]) -> list[tuple[str, ...]]:
+    """Places that differ in the letter of a phase stand together."""
+    groups: dict[str, list[str]] = {}
+    for place in places:
+        stem = place[:-1] if place.endswith(("_a", "_b", "_c")) else place
+        groups.setdefault(stem, []).append(place)
+    return [tuple(group) for group in groups.values()]
+
+
+def _candidate(record: FaultRecord, places: tuple[str, ...]) -> CandidateFault:
+    unit = record.unit or "1"
+    most = _MOST.get(unit, _SHARE)
+    top = record.maximum if math.isfinite(record.maximum) else most
+    high = 0.95 * top if unit == "1" and top <= 1.0 else min(top, most)
+    low = max(record.minimum, -0.5 if unit == "1" else -most) if record.minimum < 0.0 else 0.0
+    if record.whole:
+        high = min(record.maximum, _COUNTED)
+    return CandidateFault(
+        record.kind, places[0], unit, low, 1.0 if record.switched else high, _RATE, _ERROR,
+        places[1:], switched=record.switched, whole=record.whole or record.switched,
+    )  # fmt: skip
+
+
+def chosen(
+    texts: Sequence[str] | None, actuator: Actuator | None = None
+) -> tuple[CandidateFault, ...]:
     """Return the candidates, or those named as ``KIND@PLACE`` (or any place of `same`).
+
+    Parameters
+    ----------
+    texts : sequence of str, optional
+        Those wanted; default: all.
+    actuator : Actuator, optional
+        Whose; default: a turning servo's.
 
     Raises
     ------
@@ -125,21 +205,21 @@ def chosen(texts: Sequence[str] | None) -> tuple[CandidateFault, ...]:
     InputError
         One is named twice, or is not modelled, with the reason.
     """
+    known = CANDIDATES if actuator is None else candidates_of(actuator)
     if not texts:
-        return CANDIDATES
+        return known
     out: list[CandidateFault] = []
-    names = [f"{c.kind}@{p}" for c in CANDIDATES for p in (c.place, *c.same)]
-    reasons = {f"{item['kind']}@{item['place']}": item["reason"] for item in not_modelled()}
-    for text in texts:
-        key = text.strip()
+    names = {f"{c.kind}@{p}": c for c in known for p in (c.place, *c.same)}
+    left = not_modelled() if actuator is None else not_candidates(actuator)
+    reasons = {f"{item['kind']}@{item['place']}": item["reason"] for item in left}
+    for key in (text.strip() for text in texts):
         if key in reasons:
             raise InputError(f"--fault {key}: not modelled: {reasons[key]}")
         if key not in names:
             raise unknown("fault", key, names, "--fault")
-        item = next(c for c in CANDIDATES if key in {f"{c.kind}@{p}" for p in (c.place, *c.same)})
-        if item in out:
-            raise InputError(f"--fault {key}: {item.key} is already among the candidates")
-        out.append(item)
+        if names[key] in out:
+            raise InputError(f"--fault {key}: {names[key].key} is already among the candidates")
+        out.append(names[key])
     return tuple(out)
 
 

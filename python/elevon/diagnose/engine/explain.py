@@ -17,14 +17,13 @@ from elevon.diagnose.engine.answer import (
     SuspectedFault,
 )
 from elevon.diagnose.engine.candidates import CandidateFault
-from elevon.diagnose.engine.case import LogCase, joined, shift_of, uncertainty_of
+from elevon.diagnose.engine.case import LogCase, errors_of, joined, shift_of, uncertainty_of
 from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
-from elevon.diagnose.positions.features import UNITS
 
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding
-ALIKE = 1.0  # deviations between two faults' shifts below which no log separates them
+_POINTS = 201  # severities of another fault that are held against a cause
 
 
 #: The finding of a faulty unit with a fault that is not among the candidates.
@@ -62,7 +61,6 @@ def causes(
     result: Posterior,
     cases: Sequence[LogCase],
     candidates: Sequence[CandidateFault],
-    root: Floats,
     best: Sequence[str],
 ) -> tuple[Cause, ...]:
     """Return one cause for each fault of the best set, and for others of some probability."""
@@ -74,7 +72,7 @@ def causes(
         if c.key in covered or (probability < LISTED and c.key not in best):
             continue
         low, middle, high = quantiles(*marginals(result, c.key), (0.05, 0.5, 0.95))
-        ambiguous = [o for o in _ambiguous(cases, c, middle, candidates, root) if o.key not in best]
+        ambiguous = [o for o in _ambiguous(cases, c, middle, candidates) if o.key not in best]
         covered |= {o.key for o in ambiguous}
         probability = min(probability + sum(result.of(o.key) for o in ambiguous), 1.0)
         names = [(c.kind, place) for place in c.same] + list(c.ambiguous)
@@ -82,6 +80,8 @@ def causes(
             n for o in ambiguous for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.ambiguous)
         ]
         places = tuple(FaultPlace(*name) for name in names)
+        if c.whole:  # counted, or there or not
+            low, middle, high = (max(float(round(x)), 1.0) for x in (low, middle, high))
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), places))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
 
@@ -90,13 +90,11 @@ def _left(
     cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
 ) -> tuple[Floats, Floats]:
     """Return what faults leave of the features, and its covariance with their model errors."""
-    errors = np.concatenate([case.errors for case in cases])
     left, wide = joined(cases)
     for c, severity in faults:
         shift = shift_of(cases, c.key, np.array([severity]))[0]
         left = left - shift
-        variance = (errors * shift) ** 2 + uncertainty_of(cases, c.key, severity) ** 2
-        wide = wide + np.diag(variance) + c.error**2 * np.outer(shift, shift)
+        wide = wide + _error_of(cases, c, severity, shift)
     return left, wide
 
 
@@ -146,28 +144,38 @@ def _ambiguous(
     candidate: CandidateFault,
     severity: float,
     candidates: Sequence[CandidateFault],
-    root: Floats,
 ) -> list[CandidateFault]:
-    """Candidates that shift the features as this one does at this severity, to `ALIKE`.
+    """Candidates that at some severity shift the features as this one does at this severity.
 
-    What the model does not know of the shift, feature by feature, separates no two.
+    What a fault does is known to the model's error only: within that error of each other's shift no
+    log separates two faults. One that moves nothing to speak of is like no other.
     """
     shift = shift_of(cases, candidate.key, np.array([severity]))[0]
-    if np.linalg.norm(root @ shift) < SEEN:
+    _, covariance = joined(cases)
+    square = float(shift @ np.linalg.solve(covariance, shift))
+    alike = max(case.model.alike for case in cases)
+    if square < alike**2:
         return []
-    extra = root * (np.concatenate([case.errors for case in cases]) * shift)
-    lower = np.linalg.cholesky(np.eye(len(root)) + extra @ extra.T)
-    whiter: Floats = np.asarray(np.linalg.solve(lower, root), dtype=np.float64)
-    target = whiter @ shift
+    loose = covariance + _error_of(cases, candidate, severity, shift)
+    root = np.linalg.inv(np.linalg.cholesky(loose))
     out = []
     for other in candidates:
         if other.key == candidate.key:
             continue
-        grid = np.linspace(other.low, other.high, 401)
-        moved = shift_of(cases, other.key, grid) @ whiter.T
-        if float(np.linalg.norm(moved - target, axis=1).min()) < ALIKE:
+        grid = np.linspace(other.low, other.high, _POINTS)
+        grid = np.sort(np.concatenate((grid, 0.05 * grid)))
+        apart = (shift_of(cases, other.key, grid) - shift) @ root.T
+        if float(np.linalg.norm(apart, axis=1).min()) < alike:
             out.append(other)
     return out
+
+
+def _error_of(
+    cases: Sequence[LogCase], c: CandidateFault, severity: float, shift: Floats
+) -> Floats:
+    """Covariance of the model's error in what a fault does."""
+    each = (errors_of(cases) * shift) ** 2 + uncertainty_of(cases, c.key, severity) ** 2
+    return np.asarray(np.diag(each) + c.error**2 * np.outer(shift, shift))
 
 
 def limits(
@@ -204,7 +212,7 @@ def moved(
                 Moved(
                     case.name,
                     name,
-                    UNITS[name][0] if name in UNITS else "",
+                    case.model.table[name].unit,
                     float(case.features.values[k]),
                     float(case.unit.mean[k]),
                     float(std[k]),

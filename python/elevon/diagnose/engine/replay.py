@@ -2,48 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.candidates import CandidateFault, of_a_magnet
-from elevon.diagnose.positions.features import SIZES, FeatureVector, features_of
-from elevon.experiment import Experiment, Inputs, Variant
+from elevon.diagnose.engine.answer import SEEN
+from elevon.diagnose.engine.candidates import CandidateFault
+from elevon.diagnose.engine.reading import Reading, ReplayUnit
+from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
+from elevon.experiment import Variant
 
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.logs.log import Log
-
-_SIGNALS: Mapping[str, str] = {
-    "output_position": "encoder_position", "motor_position": "motor_position",
-    "speed_ref": "speed_ref", "motor_speed": "motor_speed", "current_ref": "current_ref",
-    "torque_current": "current_q_meas", "torque_voltage": "voltage_q_ref",
-}  # fmt: skip
-_RATE = 400.0  # Hz of the model's signals
-_DRAWS = 40
-_POINTS = 6  # severities of each candidate
-
-#: Deviation of what changes from run to run of a healthy unit. ASSUMED, all: 15 K of winding and
-#: 10 K of magnets (-0.1 %/K), friction that depends on temperature and running-in, sensors of
-#: ordinary class, a supply within its regulation.
-SPREAD: Mapping[str, tuple[float, str]] = {
-    "motor.winding_temperature": (15.0, "add"),
-    "motor.emf_constant": (0.01, "scale"),
-    "friction.dynamic": (0.05, "scale"),
-    "friction.viscous": (0.10, "scale"),
-    "inverter.supply_voltage": (0.02, "scale"),
-    "gain@sensor.current_a": (0.005, "fault"),
-    "gain@sensor.current_b": (0.005, "fault"),
-    "gain@sensor.current_c": (0.005, "fault"),
-    "load.brake": (0.02, "brake"),
-}
+_MOST = 1e4  # least deviations that a fault moves a number by: beyond it nothing more is learnt
+_ACTS = 0.5  # severity from which on a fault that is there or not acts
+_BENT = 0.3  # of a straight line's shift: below it the shift sets in between two severities
 
 
+@dataclass(frozen=True)
 class Replay:
     """Features of the model in one test.
 
@@ -54,26 +30,44 @@ class Replay:
     severities : mapping of str to ndarray, shape (m,)
         Key of the candidate to the severities that were run.
     shifts : mapping of str to ndarray, shape (m, k)
-        What they do to the features; of sizes (`SIZES`) the part at a right angle.
-    draws : ndarray, shape (d, k)
-        Features of healthy units as they differ from run to run.
+        What they do to the features; of sizes the part at a right angle.
+    table : FeatureTable
+        Records of the features.
+    mean : ndarray, shape (k,)
+        Expected of a healthy unit.
+    spread : ndarray, shape (k, k)
+        Covariance from day to day, but for least deviations.
+    degrees : float
+        How well it is known.
     uncertainties : mapping of str to ndarray, shape (m, k)
         What severities do to features that depends on an angle no log shows, by key: its deviation.
+    common_error : ndarray, shape (k,)
+        What moves all features at once and is uncertain by its own size.
+    alike : float
+        As `Reading.ALIKE`.
+    prior : bool
+        As `Reading.PRIOR`.
+    runs : int
+        Of the model.
     """
 
-    def __init__(
-        self,
-        healthy: FeatureVector,
-        severities: Mapping[str, Floats],
-        shifts: Mapping[str, Floats],
-        draws: Floats,
-        uncertainties: Mapping[str, Floats] | None = None,
-    ) -> None:
-        self.healthy = healthy
-        self.severities = severities
-        self.shifts = shifts
-        self.draws = draws
-        self.uncertainties = {} if uncertainties is None else uncertainties
+    healthy: FeatureVector
+    severities: Mapping[str, Floats]
+    shifts: Mapping[str, Floats]
+    table: FeatureTable
+    mean: Floats
+    spread: Floats
+    degrees: float
+    uncertainties: Mapping[str, Floats] = field(default_factory=dict)
+    common_error: Floats | float = 0.0
+    alike: float = 1.0
+    prior: bool = True
+    runs: int = 0
+
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Return where features stand."""
+        at = {name: k for k, name in enumerate(self.healthy.names)}
+        return [at[name] for name in names]
 
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities of shape (m,) do to the features, shape (m, k)."""
@@ -83,238 +77,200 @@ class Replay:
         """Return the deviation that a severity gives the features, shape (k,)."""
         if key not in self.uncertainties:
             return np.zeros(len(self.healthy.names))
-        table = _read(self.severities[key], self.uncertainties[key], np.array([severity]))
-        return np.asarray(table[0], dtype=np.float64)
+        at = np.array([severity])
+        return np.asarray(_read(self.severities[key], self.uncertainties[key], at)[0])
 
 
 def _read(at: Floats, table: Floats, severity: Floats) -> Floats:
-    columns = [np.interp(severity, at, column) for column in table.T]
-    return np.asarray(np.column_stack(columns), dtype=np.float64)
-
-
-def logged_features(log: Log, actuator: Actuator) -> FeatureVector:
-    """Return the features of a log."""
-    return features_of(log.without("command"), **_constants(actuator))
+    """Straight lines between the rows of a table; the ends beyond them."""
+    low = np.clip(np.searchsorted(at, severity, side="right") - 1, 0, len(at) - 2)
+    part = np.clip((severity - at[low]) / (at[low + 1] - at[low]), 0.0, 1.0)[:, None]
+    return np.asarray(table[low] * (1.0 - part) + table[low + 1] * part, dtype=np.float64)
 
 
 def replay(
-    item: Log,
-    actuator: Actuator,
-    candidates: Sequence[CandidateFault],
-    baselines: Sequence[Log] = (),
+    item: Reading, candidates: Sequence[CandidateFault], baselines: Sequence[Reading] = ()
 ) -> Replay:
     """Run the test on the model: healthy, each candidate at several severities, and the spread.
 
-    The healthy run is always the log's own. Shifts and spread are those of the first baseline that
-    is of the same test by its note, run once for all logs that stand against it; without one they
-    are the log's own. So they depend on what the caller gives, not on earlier calls.
+    The healthy run is always the log's own. Shifts and spread are those of the first baseline whose
+    runs serve, run once for all logs that stand against it; without one they are the log's own. So
+    they depend on what the caller gives, not on earlier calls.
 
     Parameters
     ----------
-    item : Log
-        Prepared.
-    actuator : Actuator
-        The healthy unit.
+    item : Reading
+        The log.
     candidates : sequence of CandidateFault
         Faults.
-    baselines : sequence of Log
-        Prepared; whose runs may serve.
+    baselines : sequence of Reading
+        Whose runs may serve.
     """
-    alike = next((b for b in baselines if candidates and _same_runs(item, b)), item)
-    made = _remembered(alike, actuator, candidates)
-    return made if alike is item else _about(made, modelled(item, actuator))
+    alike = next((b for b in baselines if candidates and item.serves(b)), item)
+    made = _remembered(alike, candidates)
+    return made if alike is item else _about(made, modelled(item))
 
 
-def modelled(item: Log, actuator: Actuator) -> FeatureVector:
+def modelled(item: Reading) -> FeatureVector:
     """Return the features of the healthy model in a log's test."""
-    return _remembered(item, actuator, ()).healthy
+    return _remembered(item, ()).healthy
 
 
 def _about(made: Replay, healthy: FeatureVector) -> Replay:
     """Return the runs of another log of the test about a log's own healthy run."""
     names = tuple(n for n in made.healthy.names if n in healthy.names)
-    at = [made.healthy.names.index(n) for n in names]
+    at = made.places(names)
     healthy = healthy.only(names)
-    return Replay(
-        healthy,
-        made.severities,
-        {key: table[:, at] for key, table in made.shifts.items()},
-        made.draws[:, at] + healthy.values - made.healthy.values[at],
-        {key: table[:, at] for key, table in made.uncertainties.items()},
+    return replace(
+        made,
+        healthy=healthy,
+        shifts={key: table[:, at] for key, table in made.shifts.items()},
+        mean=made.mean[at] + healthy.values - made.healthy.values[at],
+        spread=made.spread[np.ix_(at, at)],
+        uncertainties={key: table[:, at] for key, table in made.uncertainties.items()},
+        common_error=made.common_error[at]
+        if isinstance(made.common_error, np.ndarray)
+        else made.common_error,
     )
 
 
 _REMEMBERED = 32  # logs
-_RECENT: dict[Any, Replay] = {}  # by all that the runs depend on; the latest is the last
+_RECENT: dict[tuple[object, ...], Replay] = {}  # by all that the runs depend on; the latest is last
 
 
-def _remembered(item: Log, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
-    actuator = of_a_magnet(actuator)
-    key = (actuator.hash, tuple(candidates), _digest(item))
-    made = _RECENT.pop(key, None) or _replayed(item, actuator, candidates)
+def _remembered(item: Reading, candidates: Sequence[CandidateFault]) -> Replay:
+    key = (item.actuator.hash, tuple(candidates), item.digest())
+    made = _RECENT.pop(key, None) or _replayed(item, candidates)
     _RECENT[key] = made
     while len(_RECENT) > _REMEMBERED:
         _RECENT.pop(next(iter(_RECENT)))
     return made
 
 
-def _digest(log: Log) -> bytes:
-    """Of all in a log that its model runs depend on."""
-    braked, current = log.brake.measured, log.has("torque_current")
-    state = (braked, log.duration, log.output[0], log.speed[0], log.has("torque_voltage"), current)
-    out = hashlib.sha256(f"{state!r}".encode())
-    brake = (log.brake.time, log.brake.level) if braked else ()
-    for array in (log.time, log["command"], log.good, *brake):
-        out.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
-    return out.digest()
-
-
-def _same_runs(a: Log, b: Log) -> bool:
-    """Whether faults do the same in two logs: one test by the notes, as much of it measured."""
-    if a.note is None or b.note is None or a.note.waveform is None:
-        return False
-    shows = ("torque_current", "torque_voltage")
-    alike = [[log.brake.measured, *map(log.has, shows)] for log in (a, b)]
-    noted = (a.note.parameters, b.note.parameters)
-    if a.note.waveform != b.note.waveform or noted[0].keys() != noted[1].keys():
-        return False
-    pairs = [(a.duration, b.duration, 0.02), (a.period, b.period, 0.01)]
-    pairs += [(float(a.good.mean()), float(b.good.mean()), 0.05)]
-    pairs += [(noted[0][n], noted[1][n], 0.005) for n in noted[0]]
-    if a.brake.measured and b.brake.measured:
-        pairs.append((float(np.mean(a.brake.level)), float(np.mean(b.brake.level)), 0.1))
-    near = all(abs(x - y) <= e * max(abs(x), abs(y)) for x, y, e in pairs)
-    return near and alike[0] == alike[1]
-
-
-def _replayed(item: Log, actuator: Actuator, candidates: Sequence[CandidateFault]) -> Replay:
-    severities = {c.key: _severities(c) for c in candidates}
-    units = [ReplayUnit()]
+def _replayed(item: Reading, candidates: Sequence[CandidateFault]) -> Replay:
+    severities = {c.key: _severities(c, *item.SEVERITIES) for c in candidates}
+    faulty = [(c, float(s)) for c in candidates for s in severities[c.key] if s != 0.0]
+    days, doubts = (item.days(), item.doubts()) if candidates else (None, [])
+    units = [ReplayUnit(), *doubts, *(_with(c, s) for c, s in faulty)]
+    outcomes = list(item.outcomes([*units, *(days.units if days else [])]))
+    table = item.table
+    healthy = outcomes[0].only([n for n in outcomes[0].names if n in table])
+    rows = np.array([_values(s, healthy) for s in outcomes])
+    draws = rows[len(units) :]
+    first = 1 + len(doubts)
+    moved = _moved_by(rows[first : len(units)], healthy, table)
+    shifts, uncertainties, at = {}, {}, 0
     for c in candidates:
-        units += [ReplayUnit({}, (c.text(float(s)),)) for s in severities[c.key] if s != 0.0]
-    if candidates:
-        units += [_drawn(actuator, np.random.default_rng([15, k])) for k in range(_DRAWS)]
-    constants = _constants(actuator)
-    features = [
-        features_of(run, **constants, deviations=False) for run in runs(item, actuator, units)
-    ]
-    names = tuple(n for n in features[0].names if all(n in s.names for s in features))
-    rows = np.array([s.only(names).values for s in features])
-    shifts, uncertainties, at = {}, {}, 1
-    for c in candidates:
-        zero = severities[c.key] == 0.0
-        table = np.zeros((len(zero), len(names)))
-        count = int((~zero).sum())
-        table[~zero] = _moved_by(rows[at : at + count], rows[0], names)
-        shifts[c.key] = table * [
-            n not in c.fixed_features and (not c.known_features or n in c.known_features)
-            for n in names
-        ]
+        acts = severities[c.key] != 0.0
+        full = np.zeros((len(acts), len(healthy.names)))
+        full[acts] = moved[at : at + int(acts.sum())]
+        at += int(acts.sum())
+        shifts[c.key], unsure = _known_part(c, full, healthy.names)
         if c.known_features:
-            uncertainties[c.key] = np.abs(table * [n not in c.known_features for n in names])
-        at += count
-    return Replay(features[0].only(names), severities, shifts, rows[at:], uncertainties)
-
-
-def _moved_by(rows: Floats, healthy: Floats, names: Sequence[str]) -> Floats:
-    """Differences from the healthy run; of sizes, what must be added at a right angle."""
-    out = rows - healthy
-    for k, name in enumerate(names):
-        if name in SIZES:
-            power = np.maximum(rows[:, k] ** 2 - healthy[k] ** 2, 0.0)
-            out[:, k] = np.sqrt(power)
-    return out
-
-
-class _Constants(TypedDict):
-    """Of the actuator, for the regressions."""
-
-    ratio: float
-    pole_pairs: float
-    emf: float
-
-
-def _constants(actuator: Actuator) -> _Constants:
-    value = actuator.parameters.value
-    return {
-        "ratio": value("gear.ratio"),
-        "pole_pairs": value("motor.pole_pairs"),
-        "emf": value("motor.emf_constant"),
-    }
-
-
-def _severities(candidate: CandidateFault) -> Floats:
-    """Zero, and severities that grow by squares from it to each end of the range."""
-    steps = np.linspace(0.0, 1.0, _POINTS) ** 2
-    low = candidate.low * steps[:0:-1] if candidate.low < 0.0 else np.zeros(0)
-    return np.concatenate((low, candidate.high * steps))
-
-
-@dataclass(frozen=True)
-class ReplayUnit:
-    """A unit of the replay: values, faults, brake over the logged one, where its motor starts."""
-
-    values: Mapping[str, float] = field(default_factory=dict)
-    faults: tuple[str, ...] = ()
-    brake: float = 1.0
-    turn: float = 0.0
-
-
-def runs(log: Log, actuator: Actuator, units: Sequence[ReplayUnit]) -> Iterator[Log]:
-    """Run all units through the log's test; what each would have shown in its place."""
-    output, motor = (
-        float(log.output[0]),
-        float(log.output[0]) * actuator.parameters.value("gear.ratio"),
-    )
-    brake = log.brake
-    inputs = Inputs(
-        duration=log.duration,
-        mode="position",
-        command=(log.time, log["command"]),
-        loads={"brake": (brake.time, brake.level)} if brake.measured else {},
-        initial={
-            "motor_position": motor, "motor_speed": float(log.speed[0]), "output_position": output,
-        },
+            uncertainties[c.key] = unsure
+        if c.switched:  # nothing below the severity from which on it acts, everything above
+            severities[c.key] = np.array([0.0, np.nextafter(_ACTS, 0.0), _ACTS, 1.0])
+            shifts[c.key] = shifts[c.key][[0, 0, 1, 1]]
+    mean, spread = _healthy_days(draws, None if days is None else days.steps, healthy.values)
+    made = Replay(
+        healthy, severities, shifts, table, mean, spread, item.DEGREES, uncertainties,
+        rows[0] - rows[1] if doubts else 0.0, item.ALIKE, item.PRIOR, len(outcomes),
     )  # fmt: skip
-    experiment = Experiment(log, actuator, inputs, _shows(log), rate=f"{_RATE:g} Hz")
-    variants = [
-        Variant(
-            unit.values,
-            unit.faults,
-            {"brake": (brake.time, unit.brake * brake.level)} if brake.measured else {},
-            {"motor_position": motor + unit.turn},
-        )
-        for unit in units
-    ]
-    for run in experiment.run(variants):
-        yield run.seen(log).with_channels(command=log["command"])
+    return _refined(made, item, candidates) if candidates and item.SETS_IN else made
 
 
-def _shows(log: Log) -> dict[str, str]:
-    """What a log shows, and its current's set point: role to the model's signal."""
-    return {role: name for role, name in _SIGNALS.items() if log.has(role) or role == "current_ref"}
+def _with(c: CandidateFault, severity: float) -> ReplayUnit:
+    return ReplayUnit(Variant(faults=(c.text(severity),)))
 
 
-def _drawn(actuator: Actuator, rng: np.random.Generator) -> ReplayUnit:
-    """Return a healthy unit of another day; `turn` moves its motor: no log tells the zero."""
-    values: dict[str, float] = {}
-    faults, brake = [], 1.0
-    for path, (spread, way) in SPREAD.items():
-        step = spread * float(rng.standard_normal())
-        if way == "fault":
-            faults.append(f"{path}={step!r}")
-        elif way == "brake":
-            brake += step
-        else:
-            old = actuator.parameters.value(path)
-            values[path] = old + step if way == "add" else old * max(1.0 + step, 0.05)
-            if path == "friction.dynamic":
-                static = actuator.parameters.value("friction.static")
-                values["friction.static"] = static * max(1.0 + step, 0.05)
-    value = actuator.parameters.value
-    # Within the backlash: further off the output would not be where the motor holds it.
-    most = min(
-        0.45 * value("backlash.total") * value("gear.ratio"), math.pi / value("motor.pole_pairs")
-    )
-    turn = float(rng.uniform(-most, most))
-    return ReplayUnit(values, tuple(faults), brake, turn)
+def _values(outcomes: FeatureVector, healthy: FeatureVector) -> Floats:
+    """Values by the healthy run's names; what a run does not show stands as in the healthy one."""
+    known = dict(zip(outcomes.names, outcomes.values.tolist(), strict=True))
+    rows = zip(healthy.names, healthy.values.tolist(), strict=True)
+    values = np.array([known.get(name, value) for name, value in rows])
+    return np.where(np.isfinite(values), values, healthy.values)
+
+
+def _moved_by(rows: Floats, healthy: FeatureVector, table: FeatureTable) -> Floats:
+    """Differences from the healthy run; of sizes, what must be added at a right angle."""
+    records = [table[name] for name in healthy.names]
+    out = rows - healthy.values
+    sizes = [k for k, f in enumerate(records) if f.kind == "size"]
+    out[:, sizes] = np.sqrt(np.maximum(rows[:, sizes] ** 2 - healthy.values[sizes] ** 2, 0.0))
+    most = _MOST * deviations(records, healthy.values, "repeats")
+    return np.clip(out, -most, most)
+
+
+def _known_part(c: CandidateFault, full: Floats, names: Sequence[str]) -> tuple[Floats, Floats]:
+    """Split shifts into what is known of them and what depends on an angle that no log shows."""
+    known = np.array([not c.known_features or n in c.known_features for n in names])
+    there = np.array([n not in c.fixed_features for n in names])
+    return full * (known & there), np.abs(full * ~known)
+
+
+def _healthy_days(draws: Floats, steps: Floats | None, healthy: Floats) -> tuple[Floats, Floats]:
+    """Mean and covariance of healthy days; rare ones that were drawn too often count as rare."""
+    if not len(draws):
+        return healthy, np.zeros((len(healthy), len(healthy)))
+    if steps is None:
+        return draws.mean(axis=0), np.cov(draws.T).reshape(len(healthy), len(healthy))
+    return np.median(draws, axis=0), spread_of(draws, steps)
+
+
+def spread_of(draws: Floats, steps: Floats) -> Floats:
+    """Covariance of healthy days, shape (k, k), from draws, shape (d, k), and their factors.
+
+    What is linear in the factors stands as it is. The rest (a motion that ends a step later, a
+    loop at its limit) is known from few draws only, so each number carries its own.
+    """
+    design = np.column_stack([np.ones(len(steps)), steps])
+    slopes = np.linalg.lstsq(design, draws, rcond=None)[0]
+    residual = draws - design @ slopes
+    free = max(len(steps) - design.shape[1], 1)
+    scatter = np.sum(residual**2, axis=0) / free
+    return np.asarray(slopes[1:].T @ slopes[1:] + np.diag(scatter), dtype=np.float64)
+
+
+def _severities(c: CandidateFault, points: int, power: int) -> Floats:
+    """Zero, and severities that grow from it to each end; what is counted, each."""
+    if c.whole:
+        return np.arange(c.high + 1.0)
+    steps = np.linspace(0.0, 1.0, points + 1) ** power
+    low = c.low * steps[:0:-1] if c.low < 0.0 else np.zeros(0)
+    return np.concatenate((low, c.high * steps))
+
+
+def _refined(model: Replay, item: Reading, candidates: Sequence[CandidateFault]) -> Replay:
+    """Run one more severity of each fault that is seen where straight lines say little."""
+    records = [model.table[name] for name in model.healthy.names]
+    least = deviations(records, model.healthy.values, "repeats")
+    # With one baseline, as which most logs are judged.
+    root = np.linalg.inv(np.linalg.cholesky(2.0 * (model.spread + np.diag(least**2))))
+    more = [(c, s) for c in candidates for s in _between(model, c, root)]
+    severities, shifts = dict(model.severities), dict(model.shifts)
+    outcomes = item.outcomes([_with(c, s) for c, s in more])
+    for (c, severity), features in zip(more, outcomes, strict=True):
+        values = _values(features, model.healthy)
+        row = _moved_by(values[None, :], model.healthy, model.table)
+        at = int(np.searchsorted(severities[c.key], severity))
+        severities[c.key] = np.insert(severities[c.key], at, severity)
+        shifts[c.key] = np.insert(shifts[c.key], at, row[0], axis=0)
+    return replace(model, severities=severities, shifts=shifts, runs=model.runs + len(more))
+
+
+def _between(model: Replay, c: CandidateFault, root: Floats) -> list[float]:
+    """A severity between those that were run: where it is first seen, or where it sets in."""
+    if c.whole:
+        return []
+    grid = np.linspace(0.0, c.high, 2001)
+    seen = np.flatnonzero(np.linalg.norm(model.shift(c.key, grid) @ root.T, axis=1) > SEEN)
+    if not seen.size:
+        return []
+    limit = float(grid[seen[0]])
+    at = model.severities[c.key]
+    k = int(np.searchsorted(at, limit))
+    low, high = float(at[k - 1]), float(at[k])
+    if low == 0.0:
+        return [2.0 * limit] if 4.0 * limit < high else []
+    sizes = np.linalg.norm(model.shift(c.key, np.array([low, high])) @ root.T, axis=1)
+    return [0.5 * (low + high)] if sizes[0] < _BENT * sizes[1] * low / high else []

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from elevon.number_text import severity_texts
 from elevon.units import shown_unit, to_display
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from elevon.diagnose.engine.answer import Cause, Diagnosis
+    from elevon.diagnose.engine.answer import Cause, Diagnosis, Reason
+
 
 _NAMES = {
     "backlash@transmission": "Backlash has grown by",
@@ -51,13 +53,62 @@ def by_reason(items: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:
     return [(", ".join(keys), reason) for reason, keys in names.items()]
 
 
+def verdict(result: Diagnosis) -> str:
+    """Return the answer in one line: what is wrong, how far, how sure that is."""
+    if result.status == "model_does_not_fit" and result.reason is not None:
+        return f"MODEL DOES NOT FIT: {_off(result.reason)}; nothing is diagnosed"
+    if result.status == "unknown_fault" and result.reason is not None:
+        return f"UNKNOWN FAULT: {_off(result.reason)}, p = {_share(result.p_fault)}"
+    if result.status == "healthy":
+        left = next((text for text in result.findings if UNEXPLAINED in text), "")
+        return f"HEALTHY (p = {_share(1.0 - result.p_fault)})" + (f", but {left}" if left else "")
+    causes = {f"{c.kind}@{c.place}": c for c in result.faults}
+    named = [_named(causes[key]) for key in result.best if key in causes]
+    if named:
+        return f"FAULTY: {' and '.join(named)}, p = {_share(result.p_best)}"
+    worst = max(result.features, key=lambda m: abs(m.score))
+    return (
+        f"UNKNOWN FAULT: {_spoken(worst.name)} is {abs(worst.score):.2g} deviations from the "
+        f"healthy unit's, p = {_share(result.p_best)}"
+    )
+
+
+def folded(cause: Cause) -> list[str]:
+    """Return what a cause is ambiguous with; places of its own kind in a word: ``any phase``."""
+    places = {place for kind, place in cause.ambiguous_with if kind == cause.kind}
+    whole = {p[:-1] for p in (cause.place, *places)} if places else set()
+    one = len(whole) == 1 and {p[-1] for p in (cause.place, *places)} == set("abc")
+    out = ["any phase"] if one else []
+    return out + [
+        f"{kind}@{place}"
+        for kind, place in cause.ambiguous_with
+        if not (one and kind == cause.kind and place in places)
+    ]
+
+
+def _named(cause: Cause) -> str:
+    value, low, high = severity_texts(cause.severity, cause.interval, cause.unit)
+    sign = "+" if cause.severity > 0.0 else ""
+    low = low.rpartition(" ")[0]
+    high = high.rpartition(" ")[0]
+    return f"{cause.kind.replace('_', ' ')} {sign}{value} ({low} to {high})"
+
+
+def _off(reason: Reason) -> str:
+    return f"{_spoken(reason.feature)} is {reason.value:.3g}, at most {reason.limit:.3g} would do"
+
+
+def _share(probability: float) -> str:
+    """A probability of two digits."""
+    return f"{min(max(probability, 0.0), 1.0):.2f}"
+
+
 def sentence(result: Diagnosis) -> str:
     """Return the answer in one sentence or two."""
     if result.status == "model_does_not_fit" and result.reason is not None:
         return (
             "The model does not show what the healthy unit shows: "
-            f"{_spoken(result.reason.feature)} is {result.reason.value:.3g}, at most "
-            f"{result.reason.limit:.3g} would do. Nothing is diagnosed."
+            f"{_off(result.reason)}. Nothing is diagnosed."
         )
     left = any(UNEXPLAINED in text for text in result.findings)
     if result.status == "healthy" and left:
@@ -99,9 +150,9 @@ def _opening(key: str) -> str:
 
 
 def _spoken(name: str) -> str:
-    from elevon.diagnose.positions.features import UNITS
+    from elevon.diagnose.positions.features import FEATURES
 
-    return f"{name} ({UNITS[name][1]})" if name in UNITS else name
+    return f"{name} ({FEATURES[name].text})" if name in FEATURES else name
 
 
 def _clause(key: str, cause: Cause) -> str:

@@ -13,10 +13,11 @@ from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.healthy import DEGREES, healthy
 from elevon.diagnose.engine.replay import replay
+from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.monitor.filter import WindowSpread
 from elevon.diagnose.monitor.windows import stretch, window_features, windows_of
-from elevon.diagnose.positions.features import FeatureVector
-from elevon.diagnose.positions.log import RUN_IN, prepared
+from elevon.diagnose.positions.log import RUN_IN
+from elevon.diagnose.positions.reading import PositionReading
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def reference(
         )
     features = [log for log in features if log]
     reach = max(_MODELLED, 2.0 * width) + RUN_IN
-    model = replay(prepared(stretch(baselines[0], 0.0, reach), actuator), actuator, candidates)
+    model = replay(PositionReading(stretch(baselines[0], 0.0, reach), actuator), candidates)
     names = [n for n in model.healthy.names if all(n in e.names for log in features for e in log)]
     rows = [np.array([e.only(names).values for e in log]) for log in features]
     noise = _noise(rows, np.array([e.only(names).std for log in features for e in log]))
@@ -124,7 +125,6 @@ def _scaled(
     case: LogCase, noise: Floats, width: float, candidates: Sequence[CandidateFault], count: int
 ) -> WindowReference:
     unit = case.unit
-    assert unit.offset is not None
     scale = np.sqrt(np.diag(unit.covariance) + np.diag(noise))
     outer = np.outer(scale, scale)
     memory = float(np.exp(-width / MEMORY))

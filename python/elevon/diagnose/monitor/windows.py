@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.replay import logged_features
+from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.monitor.cutter import CutWindow, WindowCutter
 from elevon.diagnose.positions.command import noted_command
-from elevon.diagnose.positions.features import FeatureVector
 from elevon.diagnose.positions.log import RUN_IN
+from elevon.diagnose.positions.reading import logged_features
 from elevon.errors import InputError
 from elevon.logs.brake import Brake
 from elevon.logs.drive import drive_log

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.roles.role_test import (
-    BEFORE,
-    INPUTS,
-    RoleTest,
-    action_numbers,
-    test_of,
-)
+from elevon.diagnose.engine.candidates import of_a_magnet
+from elevon.diagnose.roles.load import read_load
+from elevon.diagnose.roles.reading import BEFORE, INPUTS, RoleReading
+from elevon.diagnose.roles.series import lines
 from elevon.errors import InputError
 from elevon.logs.log import Log, bridged, on_clock
 
@@ -27,10 +24,11 @@ _MISSING = 0.2  # share of samples above which a channel is left out
 _FASTEST = 1000.0  # Hz; faster logs are averaged down: the reduced-order model shows no more
 _LONGEST = 60.0  # s after the onset that are read
 _LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
+_EXACT = 2e-4  # of the command's range: what straight lines may miss
 _QUIET = 1e-3  # of the command's range: below it nothing is commanded
 
 
-def role_log(log: Log, actuator: Actuator) -> RoleTest:
+def role_log(log: Log, actuator: Actuator) -> RoleReading:
     """Read a log by its roles, on one even clock counted from its onset.
 
     Raises
@@ -40,7 +38,7 @@ def role_log(log: Log, actuator: Actuator) -> RoleTest:
     """
     log, lost = _complete(log)
     time, name = log.time, log.name
-    actions = action_numbers(actuator.wiring)
+    actions = _actions(actuator.wiring)
     first = _onset(time, log["command"], sequence=bool(actions), name=name)
     rate = 1.0 / float(np.median(np.diff(time)))
     seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
@@ -55,7 +53,7 @@ def role_log(log: Log, actuator: Actuator) -> RoleTest:
         log, time=clock, channels=channels, good=np.ones(len(clock), dtype=np.bool_),
         recording=None,
     )  # fmt: skip
-    return test_of(log, ready, actuator, rate=rate, seconds=seconds, findings=findings)
+    return _reading(log, ready, actuator, rate=rate, seconds=seconds, findings=findings)
 
 
 def _complete(log: Log) -> tuple[Log, list[str]]:
@@ -144,3 +142,83 @@ def _check_motion(used: Mapping[str, Floats], name: str) -> None:
     seen = [values for role, values in used.items() if role not in INPUTS]
     if not any(np.ptp(values) > 0.0 for values in seen):
         raise InputError(f"{name}: nothing moves")
+
+
+def _actions(wiring: str) -> tuple[str, ...]:
+    """Return the actions that command a wiring; none where a position is commanded."""
+    from elevon import _core
+
+    return tuple(next(w for w in _core.wirings() if w["name"] == wiring)["actions"])
+
+
+def _reading(
+    raw: Log,
+    log: Log,
+    actuator: Actuator,
+    *,
+    rate: float,
+    seconds: float,
+    findings: Sequence[str],
+) -> RoleReading:
+    """Return the test of a log: as it was recorded, and on instants counted from the onset."""
+    from elevon import _core
+
+    stand, wiring = raw.stand, actuator.wiring
+    shows_load = any(signal["role"] == "load" for signal in _core.signals(wiring, "low"))
+    own_load = stand.whole_load and shows_load
+    read = not own_load and log.has("load")
+    load, stroke = read_load(actuator, log.time, log.channels) if read else (None, None)
+    named = None if raw.recording is None else raw.recording.meta.get("log")
+    settings = {p: v for p, v in stand.parameters.items() if p in actuator.parameters}
+    ready = of_a_magnet(actuator).with_values(dict(settings), source="stand of the log")
+    if stroke is not None:
+        ready = ready.with_values(stroke.settings(ready), source="load of the log")
+    actions, stated = _actions(wiring), _core.initial(wiring, "low")
+    initial = {n: v for n, v in stand.initial.items() if n in stated}
+    return RoleReading(
+        log,
+        ready,
+        rate,
+        seconds,
+        _command_of(log.time, log["command"], sequence=bool(actions)),
+        actions,
+        load,
+        stroke,
+        own_load,
+        {**_initial(actuator, log.channels, stated), **initial},
+        settings,
+        f"{stand.name}: {named}" if stand.name and named else "",
+        tuple(findings),
+    )
+
+
+def _command_of(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Floats]:
+    if sequence:
+        level = np.rint(command)
+        turns = np.concatenate(([0], np.flatnonzero(np.diff(level)) + 1))
+        return time[turns], level[turns]
+    return lines(time, command, _EXACT * float(np.ptp(command)))
+
+
+def _initial(
+    actuator: Actuator, channels: Mapping[str, Floats], names: Sequence[str]
+) -> dict[str, float]:
+    """Where the model starts, as far as the log shows it."""
+    start = {role: float(np.mean(values[:3])) for role, values in channels.items()}
+    if "output_position" not in start:
+        return {}
+    position = start["output_position"]
+    if "nut_position" in names:
+        return {"nut_position": position}
+    known = actuator.parameters
+    lead = known.value("screw.lead") if "screw.lead" in known else 1.0
+    ratio = known.value("gear.ratio") / lead
+    half = 0.45 * known.value("backlash.total") * ratio
+    motor = start.get("motor_position", position * ratio)
+    # Within the backlash: a log's zeros need not be the model's.
+    motor = min(max(motor, position * ratio - half), position * ratio + half)
+    return {
+        "motor_position": motor,
+        "output_position": position,
+        "motor_speed": start.get("motor_speed", 0.0),
+    }

@@ -6,13 +6,15 @@ kind, which says how well it repeats.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.diagnose.engine.table import Feature, FeatureTable
 
 _SLOW = 100.0  # Hz of the means that levels and regressions are made of
 _PARTS = 6  # of a motion one way: what happens when
@@ -29,48 +31,43 @@ _LEFT_OUT = ("mean", "kurtosis", "peak", "moving")
 _TRAVEL = 0.02  # of the position's RMS: size of a lost motion where there is none
 
 
-@dataclass(frozen=True)
-class Kind:
-    """How well a number repeats.
+class _Kind(NamedTuple):
+    """How well a number repeats, ASSUMED.
 
     Attributes
     ----------
-    share : float
-        Least deviation from day to day, of the number's size. ASSUMED.
-    least : float
-        The same, in the number's unit. ASSUMED.
+    share, absolute : float
+        Least deviation from day to day, of the number's size and in its unit.
     mismatch : float
-        How far a healthy unit may deviate from the reduced-order model, over that least deviation.
-        ASSUMED,
-        from logs of the switching model: what compliance and current loops do, the reduced-order
-        model lacks.
+        How far a healthy unit may deviate from the reduced-order model, over that, from logs of the
+        switching model: what compliance and current loops do, the reduced-order model lacks.
+    least : float
+        Of its channel's size, the least size: below it nothing repeats.
     """
 
     share: float
-    least: float = 0.0
+    absolute: float = 0.0
     mismatch: float = 10.0
+    least: float = 0.0
 
 
 #: Least deviations, beside what drawn days of the model show: counts, clocks, what the model has
-#: not. ASSUMED: amplifiers and sensors of ordinary class, filters, a control unit's millisecond.
-KINDS: Mapping[str, Kind] = {
-    "level": Kind(0.01),
-    "slope": Kind(0.01, mismatch=30.0),
-    "gain": Kind(0.01),
-    "offset": Kind(0.02, mismatch=50.0),
-    "small": Kind(0.02, mismatch=100.0),
-    "ripple": Kind(0.05, mismatch=60.0),
-    "band": Kind(0.10, mismatch=30.0),
-    "instant": Kind(0.005, 0.01),
-    "count": Kind(0.0, 0.25, mismatch=3.0),
-    "end": Kind(0.0, 0.1, mismatch=3.0),
-    "rise": Kind(0.05, 0.5),
+#: not: amplifiers and sensors of ordinary class, filters, a control unit's millisecond.
+_KINDS: Mapping[str, _Kind] = {
+    "level": _Kind(0.01, least=0.1),
+    "slope": _Kind(0.01, mismatch=30.0, least=0.1),
+    "gain": _Kind(0.01),
+    "offset": _Kind(0.02, mismatch=50.0, least=0.5),
+    "small": _Kind(0.02, mismatch=100.0, least=0.1),
+    "ripple": _Kind(0.05, mismatch=60.0, least=0.04),
+    "band": _Kind(0.10, mismatch=30.0, least=0.02),
+    "instant": _Kind(0.005, 0.01),
+    "count": _Kind(0.0, 0.25, mismatch=3.0),
+    "end": _Kind(0.0, 0.1, mismatch=3.0),
+    "rise": _Kind(0.05, 0.5),
 }
-#: Of its channel's size, the least size of a number, by kind: below it nothing repeats. ASSUMED.
-LEAST: Mapping[str, float] = {
-    "level": 0.1, "small": 0.1, "offset": 0.5, "ripple": 0.04, "band": 0.02,
-    "slope": 0.1,
-}  # fmt: skip
+#: Of what a fault does to one number: the reduced-order model shows sizes, not waveforms.
+_ERROR = 0.15
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,7 @@ class Numbers:
     values : mapping of str to float
         By name.
     kinds : mapping of str to str
-        Name to key of `KINDS`.
+        Name to kind: how well it repeats.
     sizes : mapping of str to float
         Name to the size of what it is measured in: a channel's RMS, a slope's own part of it.
     units : mapping of str to str
@@ -102,15 +99,16 @@ class Numbers:
             self.sizes[name] = float(size)
             self.units[name] = unit
 
+    def table(self) -> FeatureTable:
+        """Return the records of the numbers."""
+        return {name: self._record(name) for name in self.values}
 
-def floors(numbers: Numbers, names: Sequence[str], values: Floats) -> Floats:
-    """Least deviation of each number from day to day, shape (k,)."""
-    out: list[float] = []
-    for name, value in zip(names, values.tolist(), strict=True):
-        kind = KINDS[numbers.kinds[name]]
-        size = max(abs(value), LEAST.get(numbers.kinds[name], 0.0) * numbers.sizes[name])
-        out.append(max(kind.share * size, kind.least, 1e-12))
-    return np.array(out, dtype=np.float64)
+    def _record(self, name: str) -> Feature:
+        kind = _KINDS[self.kinds[name]]
+        repeats = (kind.share, kind.absolute)
+        off = (kind.mismatch * kind.share, kind.mismatch * kind.absolute)
+        least = kind.least * self.sizes[name]
+        return Feature(name, self.units[name], "", repeats, off, _ERROR, least=least)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from dataclasses import replace
 from itertools import chain, combinations
 from typing import TYPE_CHECKING
 
+from elevon.diagnose.by_model import check_request, diagnose
 from elevon.diagnose.engine.answer import Cause, Diagnosis, Explanation, FaultPlace, SuspectedFault
 from elevon.diagnose.engine.candidates import CandidateFault, chosen
-from elevon.diagnose.engine.diagnosis import check_request
 from elevon.diagnose.engine.explain import POSSIBLE
 from elevon.diagnose.surrogate.model import Surrogate
 from elevon.diagnose.surrogate.population import FAULTS, learned
@@ -61,7 +61,7 @@ def diagnose_by_surrogate(
         A fault that is no candidate.
     """
     begin = clock.perf_counter()
-    check_request(logs, actuator, false_alarm, "the surrogate")
+    check_request(logs, false_alarm)
     candidates = _known(faults)
     proposal = proposed(logs, actuator, baselines=baselines, surrogate=surrogate)
     faulty = proposal.chance <= false_alarm
@@ -175,10 +175,8 @@ def diagnose_by_both(
     Where the surrogate cannot speak, or says that the logs lie outside its training set, the
     model scores all causes.
     """
-    from elevon.diagnose.engine import diagnose
-
     begin = clock.perf_counter()
-    check_request(logs, actuator, false_alarm, "the surrogate")
+    check_request(logs, false_alarm)
     candidates = chosen(faults)
     keys, note = _proposal(logs, actuator, baselines, candidates, surrogate)
     result = diagnose(logs, actuator, baselines=baselines, faults=keys, false_alarm=false_alarm)

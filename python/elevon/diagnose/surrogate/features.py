@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
 
-#: Keys of `elevon.diagnose.positions.features.UNITS`, in the surrogate's order.
+
+#: Keys of `elevon.diagnose.positions.features.FEATURES`, in the surrogate's order.
 NAMES = (
     "lost_motion",
     "position_scale",

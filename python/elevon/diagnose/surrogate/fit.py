@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +60,7 @@ def fitted(
     high: Mapping[str, TrainingTable],
     low: Mapping[str, TrainingTable],
     plan: TrainingPlan,
-    report: Mapping[str, Any],
+    report: Mapping[str, object],
     progress: Progress | None = None,
 ) -> Surrogate:
     """Train a surrogate.
@@ -95,7 +94,7 @@ def fitted(
 
 def _head(
     high: Rows, low: Rows | None, relative: bool, plan: TrainingPlan, progress: Progress | None
-) -> tuple[Head, dict[str, Any]]:
+) -> tuple[Head, dict[str, object]]:
     rng = np.random.default_rng([plan.seed, 99])
     view = _view(high, relative, rng)
     usable = high.usable()
@@ -206,7 +205,7 @@ def _calibrated(
     *,
     validation: _Validation,
     rng: np.random.Generator,
-) -> tuple[Head, dict[str, Any]]:
+) -> tuple[Head, dict[str, object]]:
     rows, opinion = validation.rows, validation.opinion
     severity = high.table.severity[rows]
     there = severity != 0.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +17,7 @@ from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
 Index = npt.NDArray[np.int64]
 
 
-def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[str, Any]:
+def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[str, object]:
     """Return the scores of a surrogate on drawn units: as trained, and with one baseline each.
 
     Parameters
@@ -28,7 +27,7 @@ def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[st
     tables : mapping of str to TrainingTable
         Test to runs.
     """
-    out = {}
+    out: dict[str, object] = {}
     for name, table in tables.items():
         rows_of = Rows.of(table)
         rows = rows_of.usable()
@@ -44,7 +43,7 @@ def judged(surrogate: Surrogate, tables: Mapping[str, TrainingTable]) -> dict[st
 
 def judged_at(
     surrogate: Surrogate, tables: Mapping[str, TrainingTable], singles: Mapping[str, TrainingTable]
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return how often each fault of `ASKED` is called and named, alone, with one baseline.
 
     Parameters
@@ -54,7 +53,7 @@ def judged_at(
     tables, singles : mapping of str to TrainingTable
         Test to runs of drawn units, and to runs of the same units with those faults.
     """
-    out = {}
+    out: dict[str, object] = {}
     for name, table in singles.items():
         rows_of = Rows.of(TrainingTable.joined([tables[name], table]))
         rows = len(tables[name].unit) + np.arange(len(table.unit))
@@ -91,7 +90,7 @@ def _only(opinion: Opinion, rows: Index) -> Opinion:
     )  # fmt: skip
 
 
-def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[str, Any]:
+def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[str, object]:
     """Scores of runs with one fault of one severity, given as at the upper end of its range."""
     logit = honest(head.scaling[:-1], opinion.presence)
     alarm = head.chances(opinion) <= FALSE_ALARM

@@ -202,7 +202,7 @@ class Surrogate:
     """
 
     tests: Mapping[str, TestModel]
-    report: Mapping[str, Any]
+    report: Mapping[str, object]
 
     def test_of(self, features: SurrogateFeatures) -> str | None:
         """Return the name of the test a log is of, None for a test that was not trained."""
@@ -232,7 +232,8 @@ class Surrogate:
             "tests": tests, "arrays": index, "report": dict(self.report),
         }  # fmt: skip
         stream = io.BytesIO()
-        np.savez(stream, about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8), **values)
+        text = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
+        np.savez(stream, about=text, **values)  # type: ignore[arg-type]
         return write_bytes(path, stream.getvalue(), force=force)
 
     @classmethod

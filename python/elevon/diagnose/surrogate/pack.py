@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+Halves = npt.NDArray[np.floating]
+Entry = tuple[str, str, list[int]]  # name, precision, shape
 _KINDS = {"half": np.float16, "single": np.float32}
 
 
-def packed(arrays: Mapping[str, npt.NDArray[Any]]) -> tuple[dict[str, Any], list[list[Any]]]:
+def packed(arrays: Mapping[str, Halves]) -> tuple[dict[str, Halves], list[Entry]]:
     """Return the values of each precision in a row, and which array has which of them.
 
     Parameters
@@ -28,12 +29,12 @@ def packed(arrays: Mapping[str, npt.NDArray[Any]]) -> tuple[dict[str, Any], list
     for kind, of in _KINDS.items():
         parts = {name: a for name, a in arrays.items() if a.dtype == of}
         out[kind] = np.concatenate([np.zeros(0, dtype=of), *(a.ravel() for a in parts.values())])
-        index += [[name, kind, list(a.shape)] for name, a in parts.items()]
+        index += [(name, kind, list(a.shape)) for name, a in parts.items()]
     return out, index
 
 
 def unpacked(
-    data: Mapping[str, npt.NDArray[Any]], index: list[list[Any]]
+    data: Mapping[str, Halves], index: Sequence[Entry]
 ) -> dict[str, npt.NDArray[np.float64]]:
     """Return the arrays by name.
 

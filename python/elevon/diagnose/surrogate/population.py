@@ -2,7 +2,7 @@
 
 Nothing here is measured: the ranges are ASSUMED wide, so that a unit whose actuator file is
 calibrated lies among them whatever its drive, friction and sensors are. What changes from day to
-day is the stated spread of diagnosis by the model (`elevon.diagnose.engine.replay.SPREAD`).
+day is the stated spread of diagnosis by the model (`elevon.diagnose.positions.reading.SPREAD`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
-from elevon.diagnose.engine.replay import SPREAD
+from elevon.diagnose.positions.reading import SPREAD
 from elevon.errors import InputError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import Moved
-from elevon.diagnose.positions.features import UNITS
+from elevon.diagnose.positions.features import FEATURES
 from elevon.diagnose.surrogate.features import NAMES, SCALES, SurrogateFeatures, log_features
 from elevon.diagnose.surrogate.model import Head, LogOpinion, Surrogate, TestModel, shipped
 from elevon.diagnose.surrogate.population import FAULTS
@@ -183,7 +183,7 @@ def _moved(read: _Read) -> list[Moved]:
     size = np.where(share, np.maximum(np.abs(healthy), view.floor), 1.0)
     return [
         Moved(
-            features.name, name, UNITS[name][0], float(features.values[k]), float(healthy[k]),
+            features.name, name, FEATURES[name].unit, float(features.values[k]), float(healthy[k]),
             float(view.spread[k] * size[k]), math.nan,
         )
         for k, name in enumerate(NAMES)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.healthy import FLOOR
+from elevon.diagnose.positions.features import FEATURES
 from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.network import Batch
 from elevon.diagnose.surrogate.population import learned
@@ -39,8 +39,8 @@ def severities(size: Floats) -> Floats:
 
 
 def _deviation(values: Floats) -> Floats:
-    """Return the least run-to-run deviation that diagnosis by the model allows for (`FLOOR`)."""
-    share, least = (np.array([FLOOR[name][k] for name in NAMES]) for k in (0, 1))
+    """Return the least run-to-run deviation that diagnosis by the model allows for."""
+    share, least = (np.array([FEATURES[name].repeats[k] for name in NAMES]) for k in (0, 1))
     return np.asarray(np.hypot(share * np.abs(values), least))
 
 
@@ -48,7 +48,7 @@ def _deviation(values: Floats) -> Floats:
 class Rows:
     """A table with, for every row, the other healthy days of its unit.
 
-    What runs of a simulation lack from day to day (`FLOOR`) is drawn anew whenever they are read
+    What runs of a simulation lack from day to day is drawn anew whenever they are read
     for.
 
     Attributes

@@ -10,10 +10,11 @@ if TYPE_CHECKING:
 
     from elevon.actuator import Actuator
 
+
 #: Deviation of what changes from day to day, by the end of a parameter's path, and how: added, a
-#: factor, or a factor of what an efficiency loses. ASSUMED, as for the rotary actuator where it is
-#: the same: 15 K of winding, 1 % of flux, friction by some percent, the supply's regulation; 10 K
-#: of lubricant, springs and delays by some percent.
+#: factor, or a factor of what an efficiency loses. ASSUMED: 15 K of winding and 10 K of magnets
+#: (-0.1 %/K), friction that depends on temperature and running-in, a supply within its regulation,
+#: 10 K of lubricant, springs and delays by some percent.
 DAILY: Mapping[str, tuple[float, str]] = {
     "motor.winding_temperature": (15.0, "add"),
     "motor.emf_constant": (0.01, "scale"),
@@ -57,7 +58,7 @@ def daily(actuator: Actuator, steps: Mapping[str, float]) -> dict[str, float]:
         for name in _named(path):
             spread, way = DAILY[name]
             step = spread * steps[_TOGETHER.get(name, name)]
-            values[path] = _moved(actuator.parameters.value(path), step, way)
+            values[path] = moved_value(actuator.parameters.value(path), step, way)
     return values
 
 
@@ -66,7 +67,8 @@ def _named(path: str) -> list[str]:
     return [n for n in DAILY if path == n or (n.endswith("_") and path.startswith(n))]
 
 
-def _moved(old: float, step: float, way: str) -> float:
+def moved_value(old: float, step: float, way: str) -> float:
+    """Return a value of another day, by the way of its line of `DAILY`."""
     if way == "add":
         return old + step
     if way == "loss":

@@ -1,0 +1,109 @@
+"""Diagnosis by the model: what moved in a log, which fault moves it so, how far, how surely."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from elevon.calibrate.ways import turns
+from elevon.diagnose.engine.candidates import chosen, not_candidates
+from elevon.diagnose.engine.case import case_of
+from elevon.diagnose.engine.diagnosis import answer_of
+from elevon.diagnose.engine.reading import ReplayUnit
+from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
+from elevon.diagnose.positions.reading import PositionReading
+from elevon.diagnose.roles.log import role_log
+from elevon.errors import InputError
+from elevon.experiment import Variant
+from elevon.threads import one_blas_thread
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.diagnose.engine.reading import Reading
+    from elevon.logs.log import Log
+
+
+def reading_of(log: Log, actuator: Actuator) -> Reading:
+    """Read a log as diagnosis sees it: of a turning servo by its positions, else by its roles.
+
+    Raises
+    ------
+    InputError
+        It cannot be diagnosed.
+    """
+    return PositionReading(log, actuator) if turns(actuator) else role_log(log, actuator)
+
+
+@one_blas_thread()
+def diagnose(
+    logs: Sequence[Log],
+    actuator: Actuator,
+    *,
+    baselines: Sequence[Log] = (),
+    faults: Sequence[str] | None = None,
+    false_alarm: float = 0.05,
+) -> Diagnosis:
+    """Say what is wrong with the unit that wrote the logs: which fault or pair of faults.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Of one unit in one condition.
+    actuator : Actuator
+        The healthy unit, calibrated.
+    baselines : sequence of Log
+        Of the healthy unit; those of the same test serve.
+    faults : sequence of str, optional
+        ``KIND@PLACE`` of the candidates; default: all.
+    false_alarm : float
+        Rate at which a healthy unit may be called faulty.
+
+    Raises
+    ------
+    InputError
+        A log that cannot be diagnosed, no candidate, a rate outside 0 to 1.
+    """
+    begin = clock.perf_counter()
+    check_request(logs, false_alarm)
+    candidates = chosen(faults, actuator)
+    healthy = [reading_of(log, actuator) for log in baselines]
+    cases = [case_of(reading_of(log, actuator), candidates, healthy) for log in logs]
+    result = answer_of(cases, candidates, false_alarm)
+    blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
+    return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
+
+
+def check_request(logs: Sequence[Log], rate: float) -> None:
+    """Refuse what no method can answer."""
+    if not logs:
+        raise InputError("diagnosis needs at least one log")
+    if not 0.0 < rate < 1.0:
+        raise InputError(f"false-alarm rate {rate:g} must be between 0 and 1")
+
+
+def traces_of(logs: Sequence[Log], actuator: Actuator, result: Diagnosis) -> list[Traces]:
+    """Return each log's signals beside the healthy model's and those with what is named.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Those that were diagnosed.
+    actuator : Actuator
+        The healthy unit.
+    result : Diagnosis
+        The answer.
+    """
+    texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
+    units = [ReplayUnit(), *([ReplayUnit(Variant(faults=texts))] if texts else [])]
+    out = []
+    for item in (reading_of(log, actuator) for log in logs):
+        panels = [
+            SignalPanel(s.name, s.unit, *s.lines, *([None] * (3 - len(s.lines))))
+            for s in item.drawn(units)
+        ]
+        good = item.log.good
+        out.append(Traces(item.name, item.log.time[good], panels))
+    return out

@@ -1,0 +1,150 @@
+"""A log made ready for one kind of features: what it shows, what the model shows in its place."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from elevon.arrays import Floats
+from elevon.diagnose.engine.table import FeatureTable, FeatureVector
+from elevon.experiment import Variant
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.logs.log import Log
+
+
+@dataclass(frozen=True)
+class ReplayUnit:
+    """A unit of the replay.
+
+    Attributes
+    ----------
+    variant : Variant
+        How its run differs from that of the actuator file.
+    late : float
+        Samples that it is seen to begin too late.
+    compliant : bool or None
+        Whether its output deflects under the log's load, which the reduced-order model does not
+        know; None: as the log has it.
+    """
+
+    variant: Variant = field(default_factory=Variant)
+    late: float = 0.0
+    compliant: bool | None = None
+
+
+class Days(NamedTuple):
+    """Healthy units of other days, and the factors they were drawn by.
+
+    Attributes
+    ----------
+    units : list of ReplayUnit
+        The d of them.
+    steps : ndarray, shape (d, f), or None
+        Factors in deviations; what is linear in them counts as stated, so they may be drawn wider.
+        None: the units scatter as healthy ones do.
+    """
+
+    units: list[ReplayUnit]
+    steps: Floats | None = None
+
+
+class DrawnSignal(NamedTuple):
+    """A signal of a log and of runs, for the page: name, unit, and values of shape (n,) each."""
+
+    name: str
+    unit: str
+    lines: list[Floats]
+
+
+class Reading(ABC):
+    """A log that can be diagnosed, read by one kind of features.
+
+    Attributes
+    ----------
+    log : Log
+        On its clock.
+    actuator : Actuator
+        The healthy unit, as it is run.
+    """
+
+    #: Degrees of freedom of Student's distribution: how well the spread is known. ASSUMED.
+    DEGREES: float
+    #: Severities of each candidate that are run, one way, and how they grow.
+    SEVERITIES: tuple[int, int]
+    #: Whether faults may set in between two severities: one more is run there.
+    SETS_IN: bool = False
+    #: Deviations between two faults' shifts below which no log separates them. ASSUMED.
+    ALIKE: float = 1.0
+
+    #: Whether the model's mean, within its mismatch, counts beside baselines; else they replace it.
+    PRIOR: bool = True
+
+    log: Log
+    actuator: Actuator
+
+    @property
+    def name(self) -> str:
+        """Of the log."""
+        return self.log.name
+
+    @property
+    @abstractmethod
+    def features(self) -> FeatureVector:
+        """What the log shows."""
+
+    @property
+    @abstractmethod
+    def table(self) -> FeatureTable:
+        """Its features' records."""
+
+    @abstractmethod
+    def digest(self) -> bytes:
+        """Of all that its model runs depend on."""
+
+    @abstractmethod
+    def outcomes(self, units: Sequence[ReplayUnit]) -> Iterator[FeatureVector]:
+        """Run units through the test; what each would have shown in the log's place."""
+
+    @abstractmethod
+    def days(self) -> Days:
+        """Return healthy units of other days."""
+
+    @abstractmethod
+    def drawn(self, units: Sequence[ReplayUnit]) -> list[DrawnSignal]:
+        """Return the log's signals that a page draws, each before those of units."""
+
+    @abstractmethod
+    def same(self, other: Reading) -> bool:
+        """Whether another log, a baseline, is of the same test."""
+
+    @abstractmethod
+    def serves(self, other: Reading) -> bool:
+        """Whether the faults' runs of a baseline of the same test serve for this log."""
+
+    def repeats(self, other: Reading) -> bool:  # noqa: ARG002
+        """Whether a baseline's features are those of this log's command as they stand."""
+        return False
+
+    def matched(self, same: Sequence[Reading]) -> tuple[Reading, list[Reading]]:
+        """Return the log and its baselines as far as they are comparable."""
+        return self, list(same)
+
+    def usable(self, names: Sequence[str], same: Sequence[Reading]) -> list[str]:  # noqa: ARG002
+        """Return the features that count with these baselines."""
+        return list(names)
+
+    def pools(self, other: Reading) -> bool:  # noqa: ARG002
+        """Whether a baseline of another test says something of what is pooled."""
+        return False
+
+    def doubts(self) -> list[ReplayUnit]:
+        """Return units whose difference from the healthy run is uncertain by its own size."""
+        return []
+
+    def notes(self, same: Sequence[Reading]) -> list[str]:  # noqa: ARG002
+        """Return findings: what the log lacks and what it costs."""
+        return []

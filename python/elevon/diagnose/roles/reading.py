@@ -1,0 +1,378 @@
+"""A log by its roles: its numbers, and what the reduced-order model shows by the same roles."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from elevon.actuator import Actuator
+from elevon.arrays import Floats
+from elevon.diagnose.engine.days import daily, factors_of
+from elevon.diagnose.engine.reading import Days, DrawnSignal, Reading, ReplayUnit
+from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
+from elevon.diagnose.roles.load import OverStroke, load_alike
+from elevon.diagnose.roles.numbers import Numbers, numbers_of
+from elevon.diagnose.roles.series import averaged, noise_deviation
+from elevon.experiment import Experiment, Inputs, Variant, shown_by
+from elevon.logs.log import Log, on_clock
+from elevon.parameters.records import wirings
+from elevon.simulate.prepare import solver_step
+from elevon.units import to_display
+
+#: What is put in, not measured.
+INPUTS = frozenset(["command", "load"])
+BEFORE = 0.1  # s before the onset that are read
+_ALIKE = 0.05  # of the command's range, RMS, up to which two commands are the same
+_SERVES = 0.005  # likewise, up to which faults do the same in both
+_SOONER = 1.3  # times the length of a log's baseline that the log may have
+_OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
+_ELASTIC = 1.0  # backlash.model: an elastic contact
+_PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time
+_SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
+_AGAIN = 8  # logs with noise added
+_DRAWS = 28
+#: Deviations of the days that are run over those stated: what sets in on a rare day is seen, and
+#: counts in full; what is linear counts as stated.
+_WIDE = 2.0
+_LATE = 0.1  # deviation, in samples, of where a log is seen to begin. ASSUMED: straight onsets
+#: Roles that are drawn, the first three of a log.
+_DRAWN = (
+    "output_position", "torque_current", "motor_speed", "supply_current", "torque_voltage", "state",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class RoleReading(Reading):
+    """The test of a log, counted from its onset, and what the log shows.
+
+    Attributes
+    ----------
+    log : Log
+        On an even clock whose zero is the onset; it begins `BEFORE` it.
+    actuator : Actuator
+        The healthy unit, with what the log's stand set.
+    rate, seconds : float
+        Hz; s after the onset.
+    command : (ndarray, ndarray)
+        Instants and values of straight lines; of actions, instants and numbers.
+    actions : tuple of str
+        That command the actuator; none where a position is commanded.
+    load : (ndarray, ndarray) or None
+        Instants and force or torque on the output, positive where it opposes positive motion; with
+        a load over the stroke what that leaves.
+    stroke : OverStroke or None
+        Load over the position, for a model that has one.
+    own_load : bool
+        Whether the model loads itself: the log's load is then an output, not an input.
+    initial : mapping of str to float or str
+        Signal to where it starts.
+    settings : mapping of str to float or str
+        Parameters that the stand set.
+    note : str
+        Stand and step that the log names, if any.
+    findings : tuple of str
+        What the caller should know.
+    like : RoleReading or None
+        The baseline that decides whether the output deflects.
+    """
+
+    # Nearly Gaussian. The least deviations are generous, so most numbers stand closer than stated;
+    # with few degrees that would count as a day of small spread, and what does vary as a fault.
+    DEGREES = 200.0
+    SEVERITIES = (4, 3)
+    SETS_IN = True
+    ALIKE = 2.0
+    # What the reduced-order model lacks moves many numbers together, which no prior of each states.
+    PRIOR = False
+
+    log: Log
+    actuator: Actuator
+    rate: float
+    seconds: float
+    command: tuple[Floats, Floats]
+    actions: tuple[str, ...]
+    load: tuple[Floats, Floats] | None
+    stroke: OverStroke | None
+    own_load: bool
+    initial: Mapping[str, float | str]
+    settings: Mapping[str, float | str]
+    note: str = ""
+    findings: tuple[str, ...] = ()
+    like: RoleReading | None = None
+
+    @cached_property
+    def seen(self) -> Mapping[str, Floats]:
+        """What the log shows, not what was put in: role to values, shape (n,)."""
+        own_load = {"load"} if self.own_load else set()
+        return {r: v for r, v in self.log.channels.items() if r not in INPUTS - own_load}
+
+    @cached_property
+    def _read(self) -> tuple[FeatureVector, FeatureTable]:
+        numbers = self._numbers(self.seen)
+        values = np.array(list(numbers.values.values()))
+        std = self._noise(numbers.values)
+        return FeatureVector(tuple(numbers.values), values, std), numbers.table()
+
+    @property
+    def features(self) -> FeatureVector:
+        """What the log shows."""
+        return self._read[0]
+
+    @property
+    def table(self) -> FeatureTable:
+        """Its features' records."""
+        return self._read[1]
+
+    def _numbers(self, channels: Mapping[str, Floats]) -> Numbers:
+        known = self.actuator.parameters
+        pairs = known.value("motor.pole_pairs") if "motor.pole_pairs" in known else None
+        return numbers_of(channels, self.log["command"], self.log.time, self.log.units, pairs)
+
+    def _noise(self, values: Mapping[str, float]) -> Floats:
+        """Each number's deviation by the noise of the log's channels: as much noise again.
+
+        What of a channel changes from sample to sample counts as its noise; ripple faster than the
+        log's clock is among it, and repeats as little.
+        """
+        sizes = {
+            role: noise_deviation(x)
+            for role, x in self.seen.items()
+            if self.log.units[role] != "1" and len(x) > 3
+        }
+        rng = np.random.default_rng(15)
+        rows = []
+        for _ in range(_AGAIN):
+            noisy = {
+                role: x + sizes[role] * rng.standard_normal(len(x)) if role in sizes else x
+                for role, x in self.seen.items()
+            }
+            known = self._numbers(noisy).values
+            rows.append([known.get(name, value) for name, value in values.items()])
+        return np.asarray(np.std(rows, axis=0, ddof=1), dtype=np.float64)
+
+    def digest(self) -> bytes:
+        """Of all in the log that its model runs depend on."""
+        state = (self.seconds, self.rate, sorted(self.seen), self.stroke, self.own_load,
+                 sorted(self.initial.items()), sorted(self.settings.items()),
+                 self._compliant)  # fmt: skip
+        out = hashlib.sha256(f"{state!r}".encode())
+        # The table's least sizes are those of the log's channels.
+        tables = (self.log.time, self.log["command"], *self.command, *(self.load or ()))
+        for array in (*tables, *(self.seen[role] for role in sorted(self.seen))):
+            out.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+        return out.digest()
+
+    def outcomes(self, units: Sequence[ReplayUnit]) -> Iterator[FeatureVector]:
+        """Run units through the test; what each would have shown in the log's place."""
+        for channels in self._channels(units):
+            values = self._numbers(channels).values
+            array = np.array(list(values.values()))
+            yield FeatureVector(tuple(values), array, np.zeros(len(array)))
+
+    def _channels(self, units: Sequence[ReplayUnit]) -> Iterator[dict[str, Floats]]:
+        """What each unit shows by the log's roles, on its instants."""
+        known = shown_by(self.actuator.wiring, "low")
+        signals = {role: known[role] for role in self.seen if role in known}
+        over = _over(self.rate, solver_step(self.actuator, "low"))
+        experiment = Experiment(
+            self.log, self.actuator, self._inputs(), signals, rate=f"{over * self.rate:.12g} Hz"
+        )
+        deflection = self.deflection
+        runs = experiment.run([unit.variant for unit in units])
+        for unit, run in zip(units, runs, strict=True):
+            phase = 0.0 if self.actions else unit.variant.later
+            shows = self._as_logged(run.log, unit.late / self.rate + phase)
+            compliant = self._compliant if unit.compliant is None else unit.compliant
+            if deflection is not None and compliant and "output_position" in shows:
+                shows["output_position"] = shows["output_position"] - deflection
+            yield shows
+
+    def _inputs(self) -> Inputs:
+        times, values = self.command
+        steps = tuple(
+            (max(float(t) + BEFORE, 0.0), self.actions[int(n) % len(self.actions)])
+            for t, n in zip(times, values, strict=True)
+            if self.actions and t < self.seconds
+        )
+        return Inputs(
+            self.seconds + BEFORE + 2.0 / self.rate,
+            wirings()[self.actuator.wiring]["modes"][0],
+            None if self.actions else (times + BEFORE, values),
+            steps,
+            {} if self.load is None else {"output": (self.load[0] + BEFORE, self.load[1])},
+            dict(self.initial),
+        )
+
+    def _as_logged(self, run: Log, late: float) -> dict[str, Floats]:
+        """A run by role, on the log's instants; one that ended early shows its end on."""
+        clock, at = run.time, self.log.time + BEFORE + late
+        over = round(1.0 / (self.rate * (clock[1] - clock[0]))) if len(clock) > 1 else 1
+        out = {}
+        for role in run:
+            values = np.nan_to_num(run[role])
+            if len(clock) == 0:
+                out[role] = np.zeros(len(at))
+                continue
+            state = self.log.units[role] == "1"
+            filtered = values if state or role.endswith(_SET_POINT) else averaged(values, over)
+            out[role] = on_clock(clock, filtered, at, self.log.units[role])
+        return out
+
+    def days(self) -> Days:
+        """Return healthy units of other days, in deviations of factors, onset and clock's phase.
+
+        The factors are drawn `_WIDE` times as far as they are; the phase is even over a sample. An
+        action is seen at a sample, so it has no other lateness.
+        """
+        rng = np.random.default_rng(15)
+        factors = factors_of(self.actuator)
+        wide = _WIDE * rng.standard_normal((_DRAWS, len(factors)))
+        phase = np.sqrt(12.0) * (rng.random(_DRAWS) - 0.5)
+        steps = np.column_stack([wide, rng.standard_normal(_DRAWS), phase])
+        late = 0.0 if self.actions else _LATE
+        units = [
+            ReplayUnit(
+                Variant(
+                    daily(self.actuator, dict(zip(factors, row, strict=False))),
+                    later=row[-1] / np.sqrt(12.0) / self.rate,
+                    number=k + 1,
+                ),
+                late=late * row[-2],
+            )
+            for k, row in enumerate(steps.tolist())
+        ]
+        return Days(units, steps)
+
+    @cached_property
+    def deflection(self) -> Floats | None:
+        """How far the output stands back under the log's load, shape (n,): force by stiffness.
+
+        The reduced-order model's backlash is rigid. None without a load, or where the unit's
+        contact is rigid.
+        """
+        known = self.actuator.parameters
+        elastic = "backlash.model" in known and known.value("backlash.model") == _ELASTIC
+        if self.load is None or not elastic:
+            return None
+        load = np.interp(self.log.time, *self.load)
+        return np.asarray(load / known.value("backlash.stiffness"), dtype=np.float64)
+
+    @cached_property
+    def _compliant(self) -> bool:
+        """Whether the log is nearer to a compliant model: what faults do depends on it."""
+        if self.like is not None:
+            return self.like._compliant
+        if self.deflection is None:
+            return True
+        units = [ReplayUnit(compliant=True), ReplayUnit(compliant=False)]
+        soft, rigid = self.outcomes(units)
+        names = [n for n in soft.names if n in self.table and n in rigid.names]
+        logged = self.features.only(names).values
+        least = deviations([self.table[n] for n in names], logged, "repeats")
+        far = [float(np.sum(((logged - x.only(names).values) / least) ** 2)) for x in (soft, rigid)]
+        return far[0] <= far[1]
+
+    def doubts(self) -> list[ReplayUnit]:
+        """The stated stiffness is seldom measured: its compliance is uncertain by its own size."""
+        return [] if self.deflection is None else [ReplayUnit(compliant=not self._compliant)]
+
+    def drawn(self, units: Sequence[ReplayUnit]) -> list[DrawnSignal]:
+        """Return the log's signals that a page draws, each before those of units."""
+        sources: list[Mapping[str, Floats]] = [self.seen, *self._channels(units)]
+        out = []
+        for role in [r for r in _DRAWN if all(r in channels for channels in sources)][:3]:
+            unit = "mm" if self.log.units[role] == "m" else self.log.units[role]
+            lines = [np.asarray(to_display(channels[role], unit)) for channels in sources]
+            out.append(DrawnSignal(role.replace("_", " ").capitalize(), unit, lines))
+        return out
+
+    def same(self, other: Reading) -> bool:
+        """Whether a baseline was commanded the same, and loaded alike.
+
+        It may go on for longer, as it is read as far as the first, and end a little sooner: a bench
+        that is started by hand cuts a short log's end off. Of two logs that name their step the
+        load needs be no nearer: it may follow from a motion that a fault has changed.
+        """
+        if not isinstance(other, RoleReading):
+            return False
+        seconds = min(self.seconds, other.seconds)
+        if self.seconds > _SOONER * seconds:
+            return False
+        grid = np.linspace(0.0, seconds, 200)
+        if self._apart(other, grid) > _ALIKE:
+            return False
+        if self.note and self.note == other.note and self.settings == other.settings:
+            return True
+        return load_alike((self.load, self.stroke), (other.load, other.stroke), grid)
+
+    def serves(self, other: Reading) -> bool:
+        """Whether faults do the same in both: set and commanded the same, as much of it seen."""
+        if not isinstance(other, RoleReading) or self.settings != other.settings:
+            return False
+        seen = self.seen.keys() == other.seen.keys() and len(self.log.time) == len(other.log.time)
+        return seen and self._apart(other, np.linspace(0.0, self.seconds, 200)) <= _SERVES
+
+    def repeats(self, other: Reading) -> bool:
+        """Whether the two differ by less than the clocks' phases, which the days have, explain."""
+        return self.serves(other)
+
+    def _apart(self, other: RoleReading, grid: Floats) -> float:
+        """RMS of the difference of two commands from where each began, over the range."""
+        size = max(float(np.ptp(self.command[1])), 1e-12)
+        ways = [np.interp(grid, *x.command) - x.command[1][0] for x in (self, other)]
+        return float(np.sqrt(np.mean((ways[0] - ways[1]) ** 2))) / size
+
+    def within(self, seconds: float, like: RoleReading | None = None) -> RoleReading:
+        """Return the test up to some seconds after its onset."""
+        if seconds >= self.seconds and like is None:
+            return self
+        keep = self.log.time < seconds * (1.0 + 1e-9)
+        log = self.log.part(keep, 0.0, seconds)
+        return replace(self, log=log, seconds=min(seconds, self.seconds), like=like)
+
+    def matched(self, same: Sequence[Reading]) -> tuple[Reading, list[Reading]]:
+        """Return the log and its baselines, each read as far as the shortest of them goes."""
+        others = [b for b in same if isinstance(b, RoleReading)]
+        seconds = min(x.seconds for x in (self, *others))
+        if not others:
+            return self, []
+        first = others[0].within(seconds)
+        later = [b.within(seconds, first) for b in others[1:]]
+        return self.within(seconds, first), [first, *later]
+
+    def notes(self, same: Sequence[Reading]) -> list[str]:
+        """Return what the log lacks and what it costs."""
+        out = list(self.findings)
+        if self._driven():
+            out.append(
+                f"{self.name}: the load drives the output part of the time and holds it at one end "
+                "of its backlash, where the reduced-order model has it carried by friction: "
+                "backlash may be named as something else, and its limit does not hold"
+            )
+        if not same:
+            out.append(
+                f"{self.name}: no baseline of this test, commanded and loaded alike and about as "
+                "long at least: how far a healthy unit deviates from the model is assumed, small "
+                "faults are not seen"
+            )
+        return out
+
+    def _driven(self) -> bool:
+        """Whether a load drives the output of an elastic backlash over a tenth of the motion."""
+        deflection = self.deflection
+        if deflection is None:
+            return False
+        speed = np.gradient(self.log["command"], self.log.time)
+        pushed = deflection * np.sign(speed) < -_PUSHED * np.abs(deflection).max()
+        moving = np.abs(speed) > _PUSHED * np.abs(speed).max()
+        return bool(np.mean(pushed[moving]) > _PUSHED)
+
+
+def _over(rate: float, step: float) -> int:
+    """Samples of the model to one of a log, an even number as far as its steps allow it."""
+    steps = round(1.0 / (rate * step))
+    return next((n for n in (_OVER, 2) if steps % n == 0), 1)
