@@ -72,12 +72,14 @@ def run(
 ) -> Answer:
     """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
     from elevon.bench.procedure import load_procedure
+    from elevon.cli.fault_options import read_faults
     from elevon.doors import bench
     from elevon.logs.formats.drive import DriveFormat
 
     procedure_document = load_procedure(procedure)
     loaded = common.read_actuator(actuator, settings)
     ratio = loaded.parameters.value("gear.ratio") if "gear.ratio" in loaded.parameters else 1.0
+    faults = read_faults(fault, loaded.wiring)
     layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
     with (
         interrupt.telling(lambda: _story(out, procedure_document, force=force)),
@@ -87,7 +89,7 @@ def run(
             procedure_document,
             loaded,
             out,
-            faults=fault or (),
+            faults=faults,
             seed=seed,
             fidelity=fidelity,
             layout=layout,

@@ -193,14 +193,14 @@ def read_scenario(
     faults: Sequence[str] | None = None,
 ) -> Scenario:
     """Read a scenario file, or the actuator's own, and apply ``--duration`` and ``--fault``."""
-    from elevon.faults import Fault
+    from elevon.cli.fault_options import read_faults
     from elevon.simulate.arguments import as_scenario
 
     scenario = as_scenario(path, actuator)
     if duration is not None:
         scenario = scenario.replaced(duration=_number(duration))
     if faults:
-        scenario = scenario.with_faults([Fault.parse(text) for text in faults])
+        scenario = scenario.with_faults(read_faults(faults, actuator.wiring))
     for line in changes(actuator, actuator.with_values(scenario.parameters, place=str(path or ""))):
         say(f"scenario: {line}")
     return scenario

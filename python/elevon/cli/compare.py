@@ -45,6 +45,7 @@ def compare(
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> Answer:
     """Run one scenario at high and at low fidelity; default: the one that the set says."""
+    from elevon.cli.fault_options import read_faults
     from elevon.compare import default_scenario, default_start
     from elevon.doors import compare as run
     from elevon.errors import InputError
@@ -58,7 +59,7 @@ def compare(
     model = common.read_actuator(actuator, settings)
     by_default = scenario is None
     run_scenario = default_scenario(model) if scenario is None else Scenario.load(scenario)
-    run_scenario = run_scenario.with_faults(fault or [])
+    run_scenario = run_scenario.with_faults(read_faults(fault, model.wiring))
     start = default_start(model, run_scenario, default=by_default) if after is None else after
     if faults_table:
         return _faults_table(model, run_scenario, start, seed)
