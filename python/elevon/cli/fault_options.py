@@ -32,17 +32,17 @@ def read_faults(texts: Sequence[str] | None, wiring: str) -> list[Fault]:
         parts = split_quantity(str(fault.severity))
         unit = record.unit or "1"
         if unit != "1" and parts is not None and not parts[1] and float(parts[0]) != 0.0:
-            shown = shown_unit(unit)
+            display = shown_unit(unit)
             raise UnitError(
-                f"{name}: {parts[0]} has no unit; write '{parts[0]} {shown}'"
-                + (f" or '{parts[0]} {unit}'" if shown != unit else "")
+                f"{name}: {parts[0]} has no unit; write '{parts[0]} {display}'"
+                + (f" or '{parts[0]} {unit}'" if display != unit else "")
                 + f" ({record.effect})"
             )
-        say(f"fault {fault.kind}@{fault.place}: {_said(record, fault, name)}")
+        say(f"fault {fault.kind}@{fault.place}: {_in_words(record, fault, name)}")
     return faults
 
 
-def _said(record: FaultRecord, fault: Fault, name: str) -> str:
+def _in_words(record: FaultRecord, fault: Fault, name: str) -> str:
     """Write a severity as a person reads it: a share in percent, a growth with its sign."""
     value = record.read_severity(fault.severity, name)
     unit = record.unit or "1"
