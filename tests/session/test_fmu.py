@@ -235,17 +235,20 @@ def test_files_that_are_none_are_refused(pi, tmp_path):
         session(lacks)
 
 
-def test_the_example_runs(tmp_path):
+def test_the_examples_run(tmp_path):
+    """The controller on a session, then on the actuator as an FMU, which runs the first one too."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", HERE / "run.py"],
+        [sys.executable, "-W", "error", HERE / "plant.py"],
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith(" rpm of 200\n")
-    assert float(done.stdout.split()[0]) == pytest.approx(200.0, rel=0.05)
+    first, second = done.stdout.splitlines()
+    assert first.endswith(" rpm of 200")
+    assert float(first.split()[0]) == pytest.approx(200.0, rel=0.05)
+    assert second == f"plant.fmu: {first}; the same bits as the session"
 
 
 def test_without_fmpy_the_message_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    with pytest.raises(InputError, match=r"pip install 'elevon\[fmu\]'"):
+    with pytest.raises(InputError, match=r"extra elevon\[fmu\], .*pip install"):
         elevon.Fmu("pi.fmu", JOINED)

@@ -109,7 +109,7 @@ def _faults(document: RunDocument) -> Iterator[FmuVariable]:
         yield FmuVariable(
             f"fault.{port.name}", f"severity, 0: healthy; {record.effect}", "input",
             ("fault", index), record.unit or "1", minimum=record.minimum, maximum=record.maximum,
-            start=0.0, discrete=True,
+            start=0.0,
         )  # fmt: skip
 
 
