@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import elevon
 
 NAME = "pisa-landing-gear"
 EXTENDED = "267 mm"
+
+loaded = cache(elevon.Actuator.load)
 
 
 def gear(
@@ -43,7 +46,7 @@ def gear_run(
     }
     if start is not None:
         data["initial"] = {"nut_position": start}
-    return elevon.Run(elevon.Actuator.load(NAME), elevon.Scenario.from_dict(data))
+    return elevon.Run(loaded(NAME), elevon.Scenario.from_dict(data))
 
 
 def gears(runs: list[elevon.Run], fidelity: str = "low") -> list[Any]:
@@ -63,4 +66,4 @@ def states(rec: Any) -> list[int]:
 
 def value(path: str) -> float:
     """A number of the actuator file, SI."""
-    return float(elevon.Actuator.load(NAME).parameters.value(path))
+    return float(loaded(NAME).parameters.value(path))
