@@ -103,7 +103,7 @@ def judged(
         group,
         unit,
         tuple(truth),
-        result.status == "faulty",
+        result.alarm,
         bool(truth) and named and sole,
         result.best if result.status == "faulty" else (),
         tuple(None if c is None else (c.severity, *c.interval) for c in causes),

@@ -231,7 +231,7 @@ def _test_limits(
         if faulty is not None:
             rows[k] = _judged(rows[k], severity, diagnosed(actuator, faulty, [base]))
         advance(progress, 0.6 + 0.4 * (done + 1) / len(tried), "fault-limits")
-    return rows, sum(answer.status == "faulty" for answer in answers)
+    return rows, sum(answer.alarm for answer in answers)
 
 
 def _broken_logs(
@@ -289,7 +289,7 @@ def _over(actuator: Actuator, row: Limit) -> float:
 
 
 def _judged(row: Limit, severity: float, answer: Diagnosis) -> Limit:
-    alarm = answer.status == "faulty"
+    alarm = answer.alarm
     return replace(row, injected=severity, alarm=alarm, named=alarm and names_it(answer, row))
 
 

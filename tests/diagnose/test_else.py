@@ -1,14 +1,21 @@
 """What is no candidate is distinguished from what is; each fault of the catalogue has a place."""
 
+from dataclasses import replace
+from itertools import combinations
+from math import comb
+
 import numpy as np
 import pytest
 
 from elevon.diagnose.by_model import diagnose
+from elevon.diagnose.engine.answer import Reason
 from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.diagnosis import answer_of
+from elevon.diagnose.engine.explain import refuting
 from elevon.diagnose.engine.healthy import healthy
+from elevon.diagnose.engine.likelihood import Frame, _somewhere
 from elevon.diagnose.engine.not_modelled import not_modelled
 from elevon.diagnose.engine.replay import Replay
 from elevon.diagnose.engine.table import FeatureVector
@@ -53,8 +60,10 @@ def test_each_fault_of_the_catalogue_is_candidate_ambiguous_or_not_modelled_once
 def test_something_else_is_distinguished_from_the_candidates():
     base = [[1.0] * 5]
     other = answer_of([_case([1, 2, 0, 1.3, 2], base)], [BACKLASH], 0.05)
-    assert (other.status, other.best) == ("faulty", ())
+    assert (other.status, other.best, other.faults) == ("unknown_fault", (), ())
+    assert other.alarm
     assert other.p_other > 0.9
+    assert abs(other.reason.value - 1.0) > abs(other.reason.limit - 1.0)
     assert other.p_fault > 0.9
     assert "none of the candidates" in sentence(other)
     assert any("no candidate explains" in text for text in other.findings)
@@ -64,6 +73,47 @@ def test_something_else_is_distinguished_from_the_candidates():
     well = answer_of([_case([1.01, 1, 0.98, 1, 1], base)], [BACKLASH], 0.05)
     assert well.status == "healthy"
     assert well.p_other < 0.01
+
+
+def test_one_feature_that_no_candidate_moves_is_something_else():
+    """A fault that explains a part of it does not win for want of a better one."""
+    for values in ([1, 1, 1, 1, 1.8], [1.05, 1, 1, 1, 1.8]):
+        answer = answer_of([_case(values, [[1.0] * 5])], [BACKLASH], 0.05)
+        assert answer.status == "unknown_fault"
+        assert answer.p_other > 0.5
+        assert answer.reason.feature == "speed_gain"
+
+
+def test_the_best_few_features_are_those_of_all_sets():
+    """Determinant and square by the matrices themselves, over every set of four features."""
+    rng = np.random.default_rng(0)
+    half = rng.standard_normal((4, 4))
+    covariance = half @ half.T + np.eye(4)
+    y = rng.standard_normal(4) * [1.0, 30.0, 1.0, 10.0]
+    frame = Frame(y, covariance, 10.0, lambda _key, s: np.zeros((len(s), 4)), np.zeros(4))
+    logs = []
+    for n in range(1, 5):
+        best = -np.inf
+        for some in map(list, combinations(range(4), n)):
+            wide = covariance.copy()
+            wide[some, some] += 9.0 * np.diag(covariance)[some]
+            square = float(y @ np.linalg.solve(wide, y))
+            best = max(best, -0.5 * np.linalg.slogdet(wide)[1] - 7.0 * np.log1p(square / 10.0))
+        logs.append(best - n * np.log(2.0) - np.log(comb(4, n)))
+    assert _somewhere(frame, 3.0) == pytest.approx(np.logaddexp.reduce(logs), rel=1e-9)
+
+
+def test_a_cause_that_a_feature_refutes_is_not_named():
+    known, base = [(BACKLASH, 0.002)], [[1.0] * 5]
+    assert refuting([_case([1.2, 1, 1, 1, 1], base)], known) is None
+    assert refuting([_case([1.2, 1, 1, 1, 9.0], base)], known).feature == "speed_gain"
+
+
+def test_a_unit_that_the_model_does_not_show_is_not_diagnosed():
+    wrong = Reason("dry_current", 3.0, 1.2)
+    gated = answer_of([replace(_case([1] * 5, [[1.0] * 5]), misfit=wrong)], [BACKLASH], 0.05)
+    assert (gated.status, gated.best, gated.faults) == ("model_does_not_fit", (), ())
+    assert (gated.hypotheses, gated.reason, gated.alarm) == ((), wrong, False)
 
 
 def test_the_rate_holds_with_a_share_for_other_directions():

@@ -43,9 +43,9 @@ def test_the_first_line_is_the_answer():
     well = replace(worn, status="healthy", best=(), faults=(), p_fault=0.03)
     assert verdict(well) == "HEALTHY (p = 0.97)"
     reason = Reason("dry_current", 0.5, 0.2)
-    assert verdict(replace(well, status="model_does_not_fit", reason=reason)).startswith(
-        "MODEL DOES NOT FIT: dry_current (current that changes sign with the motion) is 0.5, at "
-    )
+    gated = verdict(replace(well, status="model_does_not_fit", reason=reason))
+    assert gated.startswith("MODEL DOES NOT FIT: dry_current (current that changes sign with the ")
+    assert gated.endswith(" is 0.5, beyond 0.2; nothing is diagnosed")
     unknown = verdict(replace(well, status="unknown_fault", p_fault=0.9, reason=reason))
     assert unknown.startswith("UNKNOWN FAULT: dry_current")
     assert unknown.endswith("p = 0.90")

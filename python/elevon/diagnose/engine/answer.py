@@ -164,7 +164,7 @@ class Diagnosis(Result):
     best : tuple of str
         The most probable set of faults, ``KIND@PLACE``.
     p_best : float
-        Its probability.
+        Its probability; where no cause is named, that of no candidate.
     unobservable : tuple of dict
         ``kind``, ``place``, ``reason``.
     detectable : dict of str to float
@@ -182,8 +182,8 @@ class Diagnosis(Result):
     severity_units : mapping of str to str
         Unit of each candidate's severity, by ``KIND@PLACE``.
     p_other : float
-        Probability of a fault that is no candidate; part of `p_fault`. Where it is the most
-        probable, a faulty unit has an empty `best`.
+        Probability of a fault that is no candidate; part of `p_fault`. From one half on it is
+        unknown.
     reason : Reason or None
         Why no cause is named.
     actuator : str
@@ -221,6 +221,11 @@ class Diagnosis(Result):
     KIND: ClassVar = "diagnosis"
     TABLE: ClassVar = "faults"
     COLUMNS: ClassVar = ("kind", "place", "probability", "severity", "unit", "interval")
+
+    @property
+    def alarm(self) -> bool:
+        """Whether a fault is there, a candidate or another."""
+        return self.status in ("faulty", "unknown_fault")
 
     @property
     def headline(self) -> str:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.diagnose.engine.answer import SEEN, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.healthy import Elsewhere, Healthy, healthy
-from elevon.diagnose.engine.posterior import posterior
 from elevon.diagnose.engine.reading import Reading
 from elevon.diagnose.engine.replay import Replay, modelled, replay
 from elevon.diagnose.engine.table import FeatureVector
@@ -40,6 +40,8 @@ class LogCase:
         What faults do to the features.
     findings : tuple of str
         What the log lacks, and baselines that were left out.
+    misfit : Reason or None
+        Where the model shows none of the unit's baselines: what of them it shows least.
     """
 
     name: str
@@ -47,6 +49,7 @@ class LogCase:
     unit: Healthy
     model: Replay
     findings: tuple[str, ...] = ()
+    misfit: Reason | None = None
 
     @property
     def covariance(self) -> Floats:
@@ -95,10 +98,10 @@ def case_of(
     def against(features: FeatureVector, logs: Sequence[FeatureVector]) -> LogCase:
         return LogCase("", features.only(names), healthy(model, names, logs), model)
 
-    sound, findings = _sound(references, candidates, against)
+    sound, findings, misfit = _sound(references, candidates, against)
     unit = healthy(model, names, sound, elsewhere)
     findings += item.notes(same)
-    return LogCase(item.name, item.features.only(names), unit, model, tuple(findings))
+    return LogCase(item.name, item.features.only(names), unit, model, tuple(findings), misfit)
 
 
 def _transferred(item: Reading, model: Replay) -> FeatureVector:
@@ -115,14 +118,15 @@ def _sound(
     references: Sequence[tuple[str, FeatureVector]],
     candidates: Sequence[CandidateFault],
     against: Callable[[FeatureVector, Sequence[FeatureVector]], LogCase],
-) -> tuple[list[FeatureVector], list[str]]:
-    """Leave out baselines that deviate from the model and from the other baselines, and say so.
+) -> tuple[list[FeatureVector], list[str], Reason | None]:
+    """Leave out baselines that deviate from the model and from the others, and say so.
 
-    One that a candidate explains no better than none or another thing is not faulty: it shows
-    how far the unit deviates from the model.
+    Where none is left the model does not show what the healthy unit shows, nor then what a fault
+    would do to it.
     """
     sound: list[FeatureVector] = []
     findings: list[str] = []
+    misfit = None
     for k, (name, features) in enumerate(references):
         others = [e for j, (_, e) in enumerate(references) if j != k]
         alone = against(features, [])
@@ -132,32 +136,24 @@ def _sound(
         if max(chances) >= SUSPECT:
             sound.append(features)
             continue
-        if not _faulty(alone, candidates):
-            sound.append(features)
-            findings.append(
-                f"baseline {name} deviates from the model by more than is assumed of a calibrated "
-                "actuator file, and no fault explains it: it is taken as the healthy unit's"
-            )
-            continue
+        misfit = misfit or farthest(alone)
         reason = "it is unlike the other baselines"
         if not others:
-            reason = "the actuator file is not calibrated to this unit"
+            reason = "the actuator file is not calibrated to this unit (elevon calibrate)"
         findings.append(
-            f"baseline {name} looks faulty itself, or {reason} "
-            f"(a healthy unit deviates as much in less than {100 * SUSPECT:g} % of logs); "
-            "it is left out"
+            f"baseline {name} looks faulty itself, or {reason}: a healthy unit deviates as much "
+            f"in less than {100 * SUSPECT:g} % of logs; it is left out"
         )
-    return sound, findings
+    return sound, findings, None if sound else misfit
 
 
-def _faulty(case: LogCase, candidates: Sequence[CandidateFault]) -> bool:
-    """Whether one fault is more probable than none, or than one that is no candidate."""
-    residual, covariance = joined([case])
-    result = posterior(
-        residual, covariance, case.unit.degrees, candidates, case.shift, errors=case.errors,
-        uncertainty=case.uncertainty, pairs=False, other=True,
-    )  # fmt: skip
-    return result.faulty - result.other > 0.5
+def farthest(case: LogCase) -> Reason:
+    """Return the feature that is furthest from the healthy unit, in deviations, and its limit."""
+    std = np.sqrt(np.diag(case.covariance))
+    score = (case.features.values - case.unit.mean) / std
+    k = int(np.argmax(np.abs(score)))
+    limit = case.unit.mean[k] + SEEN * np.sign(score[k]) * std[k]
+    return Reason(case.unit.names[k], float(case.features.values[k]), float(limit))
 
 
 def _chance(case: LogCase, candidates: Sequence[CandidateFault]) -> float:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
+from typing import Literal
 
-from elevon.diagnose.engine.answer import Diagnosis
+import numpy as np
+
+from elevon.diagnose.engine.answer import Diagnosis, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import (
     LogCase,
     detector_of,
     errors_of,
+    farthest,
     joined,
     shift_of,
     uncertainty_of,
@@ -22,6 +26,7 @@ from elevon.diagnose.engine.explain import (
     explanations,
     limits,
     moved,
+    refuting,
     unexplained,
 )
 from elevon.diagnose.engine.likelihood import Hypothesis
@@ -29,6 +34,9 @@ from elevon.diagnose.engine.posterior import Posterior, posterior
 
 _ALL = 128  # pairs of faults that are all scored; of more the most promising of a faulty log
 _MOST = 16
+_UNKNOWN = 0.5  # probability of no candidate from which on none is named
+MISFIT: Literal["model_does_not_fit"] = "model_does_not_fit"
+Status = Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit"]
 
 
 def answer_of(
@@ -59,28 +67,65 @@ def answer_of(
     best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
+    status, reason, findings = _status(cases, result, named, faulty=faulty)
+    clear = status in ("healthy", "faulty")
+    keys, values = (best.keys, best.best) if clear else ((), ())
     return Diagnosis(
         logs=tuple(case.name for case in cases),
-        status="faulty" if faulty else "healthy",
+        status=status,
         p_fault=result.faulty,
         false_alarm=rate,
         chance=detector.chance(score),
-        faults=causes(result, cases, seen, best.keys),
-        best=best.keys,
-        p_best=_probability(result, best, faulty=faulty),
+        faults=causes(result, cases, seen, best.keys) if clear else (),
+        best=keys,
+        p_best=_probability(result, best, faulty=faulty) if clear else result.other,
         unobservable=blind,
         detectable=least,
-        features=moved(cases, best.keys, best.best),
-        findings=(
-            *(text for case in cases for text in case.findings),
-            *_left(result, cases, named, faulty=faulty),
-        ),
+        features=moved(cases, keys, values),
+        findings=(*(text for case in cases for text in case.findings), *findings),
         seconds=clock.perf_counter() - begin,
-        hypotheses=explanations(result, candidates),
-        alternatives=alternatives(result, cases, candidates, best.keys),
+        hypotheses=explanations(result, candidates) if status != MISFIT else (),
+        alternatives=alternatives(result, cases, candidates, keys),
         severity_units={c.key: c.unit for c in candidates},
         p_other=result.other,
+        reason=reason,
     )
+
+
+def _status(
+    cases: Sequence[LogCase],
+    result: Posterior,
+    named: Sequence[tuple[CandidateFault, float]],
+    *,
+    faulty: bool,
+) -> tuple[Status, Reason | None, tuple[str, ...]]:
+    """Return the verdict, why no cause is named, and the findings on what named faults leave.
+
+    What is named explains the logs better than anything else, and no feature refutes it.
+    """
+    misfit = next((case.misfit for case in cases if case.misfit is not None), None)
+    if misfit is not None:
+        return MISFIT, misfit, ()
+    if not faulty:
+        return "healthy", None, unexplained(cases, named)
+    if not named or result.other >= _UNKNOWN:
+        text = f"{NO_CANDIDATE} (probability {result.other:.2g})"
+        return "unknown_fault", farthest(cases[_worst(cases)]), (text,)
+    against = refuting(cases, named)
+    if against is not None:
+        names = " and ".join(c.key for c, _ in named)
+        text = f"the most probable cause, {names}, is refuted by {against.feature}"
+        return "unknown_fault", against, (text,)
+    return "faulty", None, unexplained(cases, named)
+
+
+def _worst(cases: Sequence[LogCase]) -> int:
+    """The log with the greatest deviation of one feature."""
+    scores = []
+    for case in cases:
+        off = np.abs(case.features.values - case.unit.mean) / np.sqrt(np.diag(case.covariance))
+        scores.append(float(off.max()))
+    return int(np.argmax(scores))
 
 
 def _best(result: Posterior, *, faulty: bool) -> Hypothesis:
@@ -96,19 +141,6 @@ def _probability(result: Posterior, best: Hypothesis, *, faulty: bool) -> float:
     if faulty and not best.keys:
         return result.other
     return result.probabilities[result.hypotheses.index(best)]
-
-
-def _left(
-    result: Posterior,
-    cases: Sequence[LogCase],
-    named: Sequence[tuple[CandidateFault, float]],
-    *,
-    faulty: bool,
-) -> tuple[str, ...]:
-    """Return the findings on what the named faults leave."""
-    if faulty and not named:
-        return (f"{NO_CANDIDATE} (probability {result.other:.2g})",)
-    return unexplained(cases, named)
 
 
 def _posterior_of(

@@ -14,6 +14,7 @@ from elevon.diagnose.engine.answer import (
     Explanation,
     FaultPlace,
     Moved,
+    Reason,
     SuspectedFault,
 )
 from elevon.diagnose.engine.candidates import CandidateFault
@@ -22,6 +23,7 @@ from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
 
 LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
+REFUTED = 5.0  # deviations that faults leave of one feature: such faults are not named. ASSUMED
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding
 _POINTS = 201  # severities of another fault that are held against a cause
 
@@ -48,6 +50,21 @@ def unexplained(
         "what is named does not explain all of the logs: another fault, or an actuator file not "
         f"calibrated to this unit (rest {np.sqrt(square):.1f} deviations RMS)",
     )
+
+
+def refuting(
+    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
+) -> Reason | None:
+    """Return the feature that contradicts faults most, if one does by `REFUTED` deviations."""
+    left, wide = _left(cases, faults)
+    std = np.sqrt(np.diag(wide))
+    k = int(np.argmax(np.abs(left) / std))
+    if abs(left[k]) < REFUTED * std[k]:
+        return None
+    values = np.concatenate([case.features.values for case in cases])
+    limit = values[k] - left[k] + REFUTED * np.sign(left[k]) * std[k]
+    name = [name for case in cases for name in case.unit.names][k]
+    return Reason(name, float(values[k]), float(limit))
 
 
 def _sum(cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]) -> Floats:

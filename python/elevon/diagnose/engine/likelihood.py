@@ -23,6 +23,7 @@ _FINE = 121
 _PAIR = 41
 _REACH = 6.0  # deviations about the best point that a fine grid covers
 _WIDE = (3.0, 10.0, 30.0)  # deviations by which something else moves the features. ASSUMED
+_FEW = 8  # features that something else moves, at most, where it does not move all
 _TURNS = 4  # of the search along one severity, then the other
 
 
@@ -142,16 +143,43 @@ def healthy_alone(frame: Frame, prior: float) -> Hypothesis:
 
 
 def outside(frame: Frame) -> float:
-    """Log of the marginal likelihood of something else: any feature deviates by so much."""
+    """Log of the marginal likelihood of something else: it moves all features, or a few of them."""
+    ways = [log for wide in _WIDE for log in (_everywhere(frame, wide), _somewhere(frame, wide))]
+    return float(np.logaddexp.reduce(ways) - np.log(len(ways)))
+
+
+def _everywhere(frame: Frame, wide: float) -> float:
+    """Every feature deviates by so much."""
     power = 0.5 * (frame.degrees + len(frame.y))
-    square = float(frame.y @ frame.y)
-    logs = [
-        -0.5 * frame.log_det
-        - len(frame.y) * np.log(wide)
-        - power * np.log1p(square / wide**2 / frame.degrees)
-        for wide in _WIDE
-    ]
-    return float(np.logaddexp.reduce(logs) - np.log(len(_WIDE)))
+    square = float(frame.y @ frame.y) / wide**2 / frame.degrees
+    return (
+        -0.5 * frame.log_det - len(frame.y) * float(np.log(wide)) - power * float(np.log1p(square))
+    )
+
+
+def _somewhere(frame: Frame, wide: float) -> float:
+    """A few features deviate by so much: one as likely as more together, any of them alike.
+
+    Of each number of features only the best set counts, found one after the other: less than the
+    sum over all sets, so something else is never favoured.
+    """
+    count, power = len(frame.y), 0.5 * (frame.degrees + len(frame.y))
+    y, log_det = frame.y.copy(), frame.log_det
+    moved = frame.root * (wide * np.sqrt(np.diag(frame.covariance)))
+    free, logs, sets = np.ones(count, dtype=np.bool_), [], 0.0
+    for n in range(1, min(count, _FEW) + 1):
+        norm = 1.0 + np.sum(moved**2, axis=0)
+        square = float(y @ y) - (y @ moved) ** 2 / norm
+        log = -0.5 * (log_det + np.log(norm)) - power * np.log1p(square / frame.degrees)
+        at = int(np.argmax(np.where(free, log, -np.inf)))
+        sets += float(np.log((count - n + 1) / n))
+        logs.append(float(log[at]) - n * np.log(2.0) - sets)
+        # Whitened again, with this one's deviation in the covariance.
+        way, size = moved[:, at].copy(), float(norm[at])
+        share = (1.0 / np.sqrt(size) - 1.0) / (size - 1.0)
+        y, moved = y + share * way * (way @ y), moved + share * np.outer(way, way @ moved)
+        log_det, free[at] = log_det + float(np.log(size)), False
+    return float(np.logaddexp.reduce(logs))
 
 
 def one_fault(frame: Frame, c: CandidateFault, prior: float) -> Hypothesis:

@@ -64,13 +64,7 @@ def verdict(result: Diagnosis) -> str:
         return f"HEALTHY (p = {_share(1.0 - result.p_fault)})" + (f", but {left}" if left else "")
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}
     named = [_named(causes[key]) for key in result.best if key in causes]
-    if named:
-        return f"FAULTY: {' and '.join(named)}, p = {_share(result.p_best)}"
-    worst = max(result.features, key=lambda m: abs(m.score))
-    return (
-        f"UNKNOWN FAULT: {_spoken(worst.name)} is {abs(worst.score):.2g} deviations from the "
-        f"healthy unit's, p = {_share(result.p_best)}"
-    )
+    return f"FAULTY: {' and '.join(named)}, p = {_share(result.p_best)}"
 
 
 def folded(cause: Cause) -> list[str]:
@@ -95,7 +89,7 @@ def _named(cause: Cause) -> str:
 
 
 def _off(reason: Reason) -> str:
-    return f"{_spoken(reason.feature)} is {reason.value:.3g}, at most {reason.limit:.3g} would do"
+    return f"{_spoken(reason.feature)} is {reason.value:.3g}, beyond {reason.limit:.3g}"
 
 
 def _share(probability: float) -> str:
@@ -122,12 +116,10 @@ def sentence(result: Diagnosis) -> str:
             f"{100 * result.chance:.3g} % of logs (called faulty below "
             f"{100 * result.false_alarm:g} %); a fault has a probability of {result.p_fault:.2g}."
         )
-    if not result.best:
-        worst = max(result.features, key=lambda m: abs(m.score))
+    if result.status == "unknown_fault" and result.reason is not None:
         return (
-            f"Something is wrong that none of the candidates explains (probability "
-            f"{result.p_best:.3g}); furthest from the healthy unit is {_spoken(worst.name)}, by "
-            f"{abs(worst.score):.2g} deviations."
+            f"Something is wrong (probability {result.p_fault:.3g}) that none of the candidates "
+            f"explains: {_off(result.reason)}."
         )
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}
     parts = [_clause(key, causes[key]) for key in result.best if key in causes]
