@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _STATE = 6  # snapshots to a state
 _SEND = 20.0  # s in which a viewer must take a snapshot
 _MOST_SIGNALS = 64  # of one viewer
+_SAMPLE = 0.006  # s in which the simulation has gone on by a sample, at real time
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css",
           ".svg": "image/svg+xml"}  # fmt: skip
 _HEADERS = {
@@ -60,6 +61,34 @@ class Exhibit(Protocol):
         ...
 
 
+class ActBell:
+    """Tells whoever waits that an act has been done, and one sample since."""
+
+    def __init__(self) -> None:
+        self._waiting: set[asyncio.Future[None]] = set()
+
+    def done(self) -> None:
+        """Ring, a sample later."""
+        asyncio.get_running_loop().call_later(_SAMPLE, self._ring)
+
+    def _ring(self) -> None:
+        for future in self._waiting:
+            if not future.done():
+                future.set_result(None)
+
+    async def within(self, seconds: float) -> bool:
+        """Wait for it; False where it has not come in time."""
+        future = asyncio.get_running_loop().create_future()
+        self._waiting.add(future)
+        try:
+            await asyncio.wait_for(future, max(0.0, seconds))
+        except TimeoutError:
+            return False
+        finally:
+            self._waiting.discard(future)
+        return True
+
+
 class LiveApp:
     """Routes of one bench.
 
@@ -73,6 +102,7 @@ class LiveApp:
 
     def __init__(self, bench: Exhibit, guard: Guard) -> None:
         self.bench, self.guard, self.control = bench, guard, Control()
+        self._acts = ActBell()
         self._frames = SharedFrames(bench.loop.ring, lambda: _text(self._now()))
         self.asgi = Starlette(
             routes=[
@@ -124,6 +154,7 @@ class LiveApp:
             return {"control": False}
         self.control.claim(viewer)
         answer = await asyncio.to_thread(self.bench.act, message)
+        self._acts.done()
         return {**answer, "control": self.control.holder == viewer}
 
     async def _file(self, request: Request) -> Response:
@@ -168,17 +199,19 @@ class LiveApp:
         loop, wall = self.bench.loop, asyncio.get_running_loop().time
         with suppress(WebSocketDisconnect, RuntimeError, TimeoutError, OSError):
             await _within(socket.send_text(_text({"viewer": name})))
-            noted, tick = -1, int(wall() * RATE)
+            noted, tick = -1, float(int(wall() * RATE))
             while True:
-                if tick // _STATE != noted:
-                    noted = tick // _STATE
+                if int(tick) // _STATE != noted:
+                    noted = int(tick) // _STATE
                     mine = json.dumps(self.control.holder == name)
                     state = self._frames.state(noted)
                     await _within(socket.send_text(f'{{"mine": {mine}, "state": {state}}}'))
                 packed = writer.pack(tick, loop.source.time, loop.reached_factor, loop.factor)
                 await _within(socket.send_bytes(packed))
-                await asyncio.sleep(max(0.0, (tick + 1) / RATE - wall()))
-                tick = max(tick + 1, int(wall() * RATE))
+                due = int(tick) + 1
+                acted = await self._acts.within(due / RATE - wall())
+                # What an act has brought about is sent at once, one picture between two.
+                tick = tick + 0.5 if acted and tick.is_integer() else await _until(due)
 
     async def _receive(self, socket: WebSocket, name: str, writer: SnapshotWriter) -> None:
         """Take messages of a viewer: its choice of signals, and acts as `/act` has them."""
@@ -240,6 +273,13 @@ def _choice(message: Mapping[str, Any]) -> tuple[list[str], int]:
 def _token(request: Request | WebSocket) -> str:
     given = request.headers.get("x-token") or request.query_params.get("token", "")
     return str(given)
+
+
+async def _until(tick: int) -> float:
+    """Wait for a picture's instant; its number, or that of a later one where it has passed."""
+    wall = asyncio.get_running_loop().time
+    await asyncio.sleep(max(0.0, tick / RATE - wall()))
+    return float(max(tick, int(wall() * RATE)))
 
 
 async def _within(sent: Awaitable[None]) -> None:

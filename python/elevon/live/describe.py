@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 PLOTS = (
     ("position", ("command", "output_position", "nut_position")),
     ("speed", ("speed_ref", "motor_speed")),
-    ("current", ("current_ref", "current_q_meas", "current_line", "current_bus")),
+    ("current", ("current_ref", "current_q_meas", "current_mean", "current_peak")),
     ("phases", ("current_a", "current_b", "current_c")),
     ("temperature", ("winding_temperature", "surface_temperature", "ambient_temperature")),
 )

@@ -30,12 +30,12 @@ class SharedFrames:
     def __init__(self, ring: SampleRing, state: Callable[[], str]) -> None:
         self.ring = ring
         self._state = state
-        self._tick, self._noted = -1, -1
+        self._tick, self._noted = -1.0, -1
         self._last = ring.written
         self._text = ""
         self._bodies: dict[tuple[int, tuple[int, ...]], tuple[int, bytes]] = {}
 
-    def at(self, tick: int) -> int:
+    def at(self, tick: float) -> int:
         """Go on to a picture's number; return the number of the sample up to which it goes."""
         if tick != self._tick:
             self._tick, self._last = tick, self.ring.written
@@ -81,7 +81,7 @@ class SnapshotWriter:
         """Take other signals from now on; those that are not there are left out."""
         self._columns, self._choice = tuple(self._frames.ring.columns(names)), choice
 
-    def pack(self, tick: int, time: float, factor: float, wanted: float) -> bytes:
+    def pack(self, tick: float, time: float, factor: float, wanted: float) -> bytes:
         """Return the snapshot of what came since the last one, for a picture's number."""
         last = self._frames.at(tick)
         rows, body = self._frames.body(self._next, self._columns)

@@ -263,6 +263,8 @@ class HealthWatch:
                 self.health = Health(text=part)
                 pause = _LEAST
                 continue
+            if self.health.status == "waiting":
+                self.health = Health(text="diagnosing the first stretch")
             answer = self._examined(door, part, folder / "live.csv")
             if answer is None:
                 return

@@ -99,7 +99,7 @@ function rotary(model) {
   const motor = new Motor(75, 110, 52), gear = wheel(182, 110, 30, 10), big = wheel(270, 110, 56, 22);
   const gap = new Gap(475, 105, "backlash at the output", { typical: 0.6, shown: "°" }, 180 / Math.PI);
   const arm = drawn("line", { x1: 270, y1: 110, x2: 360, y2: 110, class: "arm" });
-  const ghost = drawn("line", { x1: 270, y1: 110, x2: 366, y2: 110, class: "ghost" });
+  const ghost = drawn("line", { x1: 270, y1: 110, x2: 388, y2: 110, class: "ghost" });
   const load = new Arrow(270, 200, "load");
   const angle = text(270, 40, "", "value", "middle");
   const nodes = [drawn("line", { x1: 127, x2: 182, y1: 110, y2: 110, class: "frame" }), motor.node, gear, big, ghost, arm, gap.node, load.node, angle, text(182, 66, `1 : ${digits(ratio, 3)}`, "label", "middle")];
@@ -131,7 +131,7 @@ function ballscrew(model) {
   const nut = drawn("g", {}, drawn("rect", { x: -18, y: -26, width: 36, height: 52, rx: 4, class: "metal" }), ...[-9, 0, 9].flatMap(x => [drawn("circle", { cx: x, cy: -13, r: 4, class: "mark" }), drawn("circle", { cx: x, cy: 13, r: 4, class: "mark" })]));
   const ram = drawn("g", {}, drawn("path", { d: "M0 -18 h150 v36 h-150 z", class: "metal" }), drawn("circle", { cx: 158, cy: 0, r: 10, class: "frame" }));
   const mark = drawn("path", { d: "M0 -44 l-5 -9 h10 z", class: "force-head" });
-  const gap = new Gap(420, 180, "backlash between nut and ram", { typical: 0.15, shown: "mm" }, 1000);
+  const gap = new Gap(420, 180, "backlash, nut to ram", { typical: 0.15, shown: "mm" }, 1000);
   const load = new Arrow(210, 180, "load"), words = text(235, 30, "", "value", "middle");
   const nodes = [motor.node, screw.node, ram, nut, mark, gap.node, load.node, words, text(235, 47, "▼ command", "label", "middle")];
   const draw = v => {
@@ -164,7 +164,7 @@ function landingGear(model) {
   const leg = drawn("g", {}, drawn("line", { x1: hinge[0], y1: hinge[1], x2: hinge[0], y2: 170, class: "arm" }), drawn("line", { x1: hinge[0], y1: hinge[1], x2: hinge[0] - 36, y2: hinge[1] + 16, class: "arm" }), drawn("circle", { cx: hinge[0], cy: 186, r: 20, class: "metal" }), drawn("circle", { cx: hinge[0], cy: 186, r: 7, class: "frame" }));
   const lock = drawn("path", { d: "M-7 0 v-12 a7 7 0 0 1 14 0 v12 z", class: "frame" }), body = drawn("rect", { x: 238, y: 132, width: 24, height: 18, rx: 3, class: "off" });
   const lockWords = text(250, 168, "", "value", "middle"), words = text(205, 30, "", "value", "middle"), load = new Arrow(330, 150, "load");
-  const lamps = [["proximity_0", "0 %"], ["proximity_25", "25 %"], ["proximity_75", "75 %"], ["proximity_100", "100 %"], ["proximity_wheels", "wheels"], ["brake_released", "brake free"]].map(([name, label], k) => ({ name, ...lamp(22 + 46 * k, 190, label) }));
+  const lamps = [["proximity_0", "0 %"], ["proximity_25", "25 %"], ["proximity_75", "75 %"], ["proximity_100", "100 %"], ["proximity_wheels", "wheels"], ["brake_released", "brake free"]].map(([name, label], k) => ({ name, ...lamp(22 + 54 * k, 190, label) }));
   const ground = drawn("line", { x1: 330, x2: 495, y1: 208, y2: 208, class: "axis" });
   const nodes = [motor.node, first, second, screw.node, ram, nut, strut, leg, lock, body, lockWords, words, load.node, ground, ...lamps.map(item => item.node), drawn("circle", { cx: hinge[0], cy: hinge[1], r: 5, class: "frame" })];
   let least = Infinity, most = -Infinity;

@@ -108,10 +108,10 @@ export class Spectrum {
   constructor(model, store) {
     this.store = store;
     this.unit = Object.fromEntries(model.signals.map(signal => [signal.name, signal]));
-    const usual = ["current_q_meas", "current_line", "motor_speed"].find(name => this.unit[name]);
+    const usual = ["current_q_meas", "current_mean", "motor_speed"].find(name => this.unit[name]);
     by("spectrum-of").append(...model.signals.map(s => element("option", { selected: s.name === usual }, s.name)));
     const options = { width: 300, height: 120, legend: { show: false }, cursor: { show: false },
-      scales: { x: { time: false }, y: { distr: 3 } }, axes: [axis("Hz", 24, 40), axis("", 44, 20)],
+      scales: { x: { time: false }, y: { distr: 3 } }, axes: [axis("", 24, 40), { ...axis("", 50, 20), values: (_, ticks) => ticks.map(v => v == null ? "" : String(v)) }],
       series: [{}, { stroke: COLOURS[0], width: 1.2, points: { show: false } }] };
     this.plot = new uPlot(options, [[], []], by("spectrum"));
     this.sight = new Sight(by("spectrum"));
