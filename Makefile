@@ -27,7 +27,7 @@ CAPI := $(BIN)/python tools/capi.py
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup capi demo check test test-rust test-python test-long lint size stubs docs wheel bench format lock audit licences clean
+.PHONY: help setup capi demo check test test-rust test-python test-long lint size stubs docs wheel sdist bench format lock audit licences clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -98,8 +98,16 @@ docs: setup $(STAMPS)/docs ## the documentation site, its links followed: out/do
 
 wheel: $(STAMPS)/packages ## the wheel for this system in dist/, checked where there is no compiler
 	$(CAPI)
+	git rev-parse --short=12 HEAD > python/elevon/cli/commit.txt
 	$(BIN)/maturin build --release --quiet --locked --out dist
+	@rm -f python/elevon/cli/commit.txt
 	$(BIN)/python tools/check_wheel.py dist
+
+sdist: $(STAMPS)/packages ## the source distribution in dist/, built once more from itself
+	git rev-parse --short=12 HEAD > python/elevon/cli/commit.txt
+	$(BIN)/maturin sdist --out dist
+	@rm -f python/elevon/cli/commit.txt
+	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist/from-source dist/elevon-*.tar.gz
 
 bench: setup ## the timed comparisons
 	$(BIN)/python -m pytest -q -m bench

@@ -1,4 +1,4 @@
-"""Install the newest wheel of a folder where there is no compiler, and use it without any extra.
+"""Install the newest wheel of a folder where there is no compiler; use it without and with extras.
 
 Run by `make wheel`. Needs a package index, as every `pip install` does.
 """

@@ -1,5 +1,6 @@
 """The guide reads easily: length, words a sentence, no seed numbers; what its pages show runs."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
+from evidence import checks_of  # noqa: E402
 from newcomer import Block, blocks_of, matches, run_page, shortened  # noqa: E402
 from prose import MOST_LINES, MOST_WORDS, guide_pages, measured  # noqa: E402
 
@@ -54,6 +56,12 @@ def test_blocks_are_run(body, wrong, tmp_path, monkeypatch):
     page = tmp_path / "page.md"
     page.write_text(f"```sh\n{body}```\n\n```text\none\n```\n", "utf-8")
     assert run_page(page, Path(sys.executable).parent) == wrong
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("path", sorted((ROOT / "docs/evidence/runs").glob("*.json")), ids=str)
+def test_evidence_is_what_its_command_writes(path):
+    assert json.loads(path.read_text("utf-8"))["checks"] == checks_of(path.stem)
 
 
 @pytest.mark.long

@@ -112,7 +112,7 @@ def test_example(tmp_path):
 
 
 BENCHES = {
-    "torino-rotary": ("chirp", "backlash@transmission=0.5 deg"),
+    "torino-rotary": ("chirp", "backlash@transmission=0.1 deg"),
     "nasa-ballscrew": ("ballscrew-profiles", "backlash@transmission=0.1 mm"),
     "pisa-landing-gear": ("gear-cycles", "proximity_off@sensor.proximity_25=1"),
     "examples/linear-drive/drive.toml": ("ballscrew-profiles", "backlash@transmission=0.1 mm"),
