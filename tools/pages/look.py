@@ -34,8 +34,8 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
     wrong, texts = [], 0
-    with sync_playwright() as play:
-        browser = play.chromium.launch(
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(
             executable_path=shutil.which("chromium"), args=["--no-sandbox"]
         )
         for theme in ("light", "dark"):
