@@ -93,7 +93,7 @@ def test_a_landing_gear_is_looked_at_when_its_motion_has_ended():
     )
     _run(bench, 0.5)
     assert "waiting" in bench.stretch()
-    _run(bench, 14.0)
+    _run(bench, 9.5)
     assert bench.stretch().time[-1] == pytest.approx(bench.unit.time)
 
 

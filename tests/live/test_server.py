@@ -7,9 +7,11 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from elevon.cli import main
+from tests.live.browser import browser, needs_browser, opened, press, until
 from tests.live.serving import SINE, bench
 
 STREAM = "stream"
+PICTURE = "document.querySelector('#picture').innerHTML"
 
 
 @pytest.fixture(scope="module")
@@ -200,11 +202,11 @@ def test_malformed_messages_leave_the_server_up(live):
     rng = random.Random(30)
     with _socket(live) as socket:
         _viewer(socket)
-        for _ in range(200):
+        for _ in range(1000):
             text = "".join(rng.choice('{}[]":,0e-."watchcommandfault ') for _ in range(40))
             socket.send(rng.choice([text, text.encode(), '{"watch": 3}', '{"factor": "x"}']))
         errors = 0
-        while errors < 200:
+        while errors < 1000:
             data = socket.recv(timeout=30)
             errors += isinstance(data, str) and "error" in data
     assert live.state()["time"] > 0.0
@@ -218,3 +220,17 @@ def test_a_viewer_that_hangs_slows_nobody(live):
         for _ in range(20):
             socket.recv(timeout=30)
         assert live.state()["time"] > begin
+
+
+@needs_browser
+def test_run_moves_the_picture(live):
+    with browser() as run:
+        page, complaints = opened(run, live)
+        before = page.evaluate(PICTURE)
+        press(page, "#run")
+        until(page, "elevonPage.state.panel.moving && elevonPage.store.latest.motor_speed")
+        until(page, "elevonPage.latency !== null")  # what the act did has been drawn
+        assert page.evaluate(PICTURE) != before
+        assert live.state()["control"]["held"]
+        assert complaints == []
+    live.until(lambda state: state["control"] == {"held": False, "viewers": 0})
