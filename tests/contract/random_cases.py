@@ -125,14 +125,14 @@ def parted(case: Case) -> list[str]:
         return [f"high ends as {broken.status} ({broken.message}), low as {shows.status}"]
     names = sorted(broken.sizes.keys() & shows.sizes.keys())
     size = {name: max(broken.sizes[name], healthy.sizes[name]) for name in names}
-    if all(_among([broken], shows, name, size[name]) for name in names):
+    if all(among([broken], shows, name, size[name]) for name in names):
         return []
     alike = [broken, *hairs(case)]
     return [
         f"{name} {broken.sizes[name]:.4g} high, {shows.sizes[name]:.4g} low "
         f"(healthy {healthy.sizes[name]:.4g})"
         for name in names
-        if not _among(alike, shows, name, size[name])
+        if not among(alike, shows, name, size[name])
     ]
 
 
@@ -145,7 +145,7 @@ def hairs(case: Case) -> list[Sizes]:
     return sizes_of(case.high, variants, case.seconds)
 
 
-def _among(runs: Sequence[Sizes], shows: Sizes, name: str, size: float) -> bool:
+def among(runs: Sequence[Sizes], shows: Sizes, name: str, size: float) -> bool:
     """Is a feature within what the runs show, give or take `APART`?"""
     seen = [run.sizes[name] for run in runs]
     return min(seen) - APART * size <= shows.sizes[name] <= max(seen) + APART * size

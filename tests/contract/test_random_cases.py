@@ -9,7 +9,8 @@ import os
 
 import pytest
 
-from tests.contract.random_cases import Case, cases, declared, not_modelled, parted
+from tests.contract.agreement import Sizes
+from tests.contract.random_cases import Case, among, cases, declared, not_modelled, parted
 
 SEED = int(os.environ.get("ELEVON_SEED", "1"))
 
@@ -19,6 +20,15 @@ def undeclared(case: Case) -> list[str]:
     if not_modelled(case):
         return []
     return [f"{case.title}: {text}" for text in parted(case) if not declared(case, text)]
+
+
+def test_a_feature_lies_among_what_the_runs_show() -> None:
+    """Within a tenth of the outermost ones; a single run is both."""
+    one, other, middle, beyond = (Sizes("ok", "", {"x": x}) for x in (1.0, 2.0, 1.5, 2.3))
+    assert among([one, other], middle, "x", 1.0)
+    assert not among([one], middle, "x", 1.0)
+    assert not among([one, other], beyond, "x", 1.0)
+    assert among([other], Sizes("ok", "", {"x": 2.05}), "x", 1.0)
 
 
 def test_three_random_cases() -> None:
