@@ -9,12 +9,14 @@ from string import Template
 from elevon.errors import InputError
 from elevon.parameters import SetFile
 
+_LONGEST = 4.0  # s of a cycle
+
 
 def scaled_procedure(loaded: SetFile) -> str:
     """Return the text of a procedure whose motions and loads suit an actuator's design.
 
-    Sines reach half the rated speed, over a tenth of the stroke to either side at most, and no
-    cycle is shorter than two seconds.
+    Sines reach half the rated speed, over a fifth of the stroke to either side at most, in cycles
+    of at most four seconds.
 
     Raises
     ------
@@ -29,11 +31,11 @@ def scaled_procedure(loaded: SetFile) -> str:
     linear = "lead" in value
     display = 1e3 if linear else 180.0 / math.pi
     speed = 0.5 * value["speed"]
-    amplitude = min(0.2 * value["stroke"], speed / math.pi)
+    amplitude = min(0.2 * value["stroke"], _LONGEST * speed / (2.0 * math.pi))
     frequency = speed / (2.0 * math.pi * amplitude)
     small = 0.2 * amplitude
     numbers = {
-        "duration": 4.0 / frequency,
+        "duration": 3.0 / frequency,
         "amplitude": amplitude * display,
         "frequency": frequency,
         "small": small * display,
@@ -43,7 +45,7 @@ def scaled_procedure(loaded: SetFile) -> str:
         numbers |= {"half": 0.5 * value["thrust"], "quarter": 0.25 * value["thrust"]}
     else:
         torque = value["power"] / value["motor_speed"]
-        numbers |= {"low": 0.1 * torque, "slope": 0.1 * torque * frequency}
+        numbers |= {"low": 0.1 * torque, "slope": 0.4 * torque / numbers["duration"]}
     template = files("elevon.bench") / "templates" / ("linear.txt" if linear else "rotary.txt")
     texts = {name: f"{number:.4g}" for name, number in numbers.items()}
     return Template(template.read_text("utf-8")).substitute(texts, name=loaded.name)

@@ -145,6 +145,8 @@ def _note(setup: Setup, layout: DriveFormat) -> dict[str, Any]:
     elif rig.springs is not None or rig.weights is not None:
         note["load_cell_arm"] = (rig.springs or rig.weights).radius  # type: ignore[union-attr]
     note["current"] = layout.current_convention
+    if layout.gear_ratio != DriveFormat().gear_ratio:
+        note["gear_ratio"] = layout.gear_ratio
     return note
 
 

@@ -122,6 +122,8 @@ def import_log(
     report = ImportReport(str(path), table.file_format)
     for text in table.notes:
         report.note("file", "format", text)
+    if gear_ratio is None and mapped is None and note is not None:
+        gear_ratio = note.gear_ratio
     ratio = gear_ratio_of(gear_ratio, mapped, table, log_format)
     assigned = assign_columns(table, mapped, ratio, report, layout=log_format)
     quality, time = _clock(table, assigned, report)

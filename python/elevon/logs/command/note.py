@@ -81,6 +81,8 @@ class CommandNote:
         The full form, where it was given.
     ignored : tuple of str
         Keys that mean nothing here.
+    gear_ratio : float or None
+        Motor over output; of a log in the bench's format, whose columns do not say it.
     """
 
     source: str
@@ -92,6 +94,7 @@ class CommandNote:
     current: str | None = None
     ignored: tuple[str, ...] = ()
     command: Command | None = None
+    gear_ratio: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types for a recording's metadata."""
@@ -101,6 +104,7 @@ class CommandNote:
             "brake": self.brake,
             "load_cell_arm": self.load_cell_arm,
             "chain_ratio": self.chain_ratio,
+            "gear_ratio": self.gear_ratio,
             "current": self.current,
             "command": None if self.command is None else _plain(self.command),
         }
@@ -116,6 +120,7 @@ class CommandNote:
             brake=data.get("brake"),
             load_cell_arm=data.get("load_cell_arm"),
             chain_ratio=data.get("chain_ratio"),
+            gear_ratio=data.get("gear_ratio"),
             current=data.get("current"),
             command=None if command is None else _command(command, source, None),
         )
@@ -241,7 +246,7 @@ def _canonical(key: str) -> str | None:
     text = _spelt(key)
     for name in (text, _SUFFIX.sub("", text)):
         name = _SPELLINGS.get(name, name)  # noqa: PLW2901 - one spelling for each meaning
-        if name in _KINDS or name in {"waveform", "brake", "chain_ratio", "current"}:
+        if name in _KINDS or name in {"waveform", "brake", "chain_ratio", "gear_ratio", "current"}:
             return name
     return None
 
@@ -258,17 +263,18 @@ def _note(place: str, values: dict[str, Any], ignored: tuple[str, ...]) -> Comma
     if current is not None and str(current).lower() not in {"rms", "peak"}:
         raise InputError(f"{place}: current = {quoted(str(current))}; valid: 'rms', 'peak'")
     brake = _switch(place, values.pop("brake", None))
-    ratio = values.pop("chain_ratio", None)
+    ratio, geared = values.pop("chain_ratio", None), values.pop("gear_ratio", None)
     numbers = {name: _number(f"{place}: {name}", v, _KINDS[name]) for name, v in values.items()}
     arm = numbers.pop("load_cell_arm", None)
     chain = None if ratio is None else _number(f"{place}: chain_ratio", ratio, "1")
-    for name, value in (("load_cell_arm", arm), ("chain_ratio", chain)):
+    gear = None if geared is None else _number(f"{place}: gear_ratio", geared, "1")
+    for name, value in (("load_cell_arm", arm), ("chain_ratio", chain), ("gear_ratio", gear)):
         if value is not None and not value > 0.0:
             raise InputError(f"{place}: {name} = {value:g} must be above 0")
     _check_parameters(place, waveform, numbers)
     return CommandNote(
         place, waveform, numbers, brake, arm, chain,
-        None if current is None else str(current).lower(), ignored,
+        None if current is None else str(current).lower(), ignored, gear_ratio=gear,
     )  # fmt: skip
 
 
