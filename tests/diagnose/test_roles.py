@@ -11,7 +11,7 @@ from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.candidates import candidates_of, chosen, not_candidates
 from elevon.diagnose.engine.case import case_of
 from elevon.diagnose.engine.days import drawn, factors_of
-from elevon.diagnose.engine.replay import spread_of
+from elevon.diagnose.engine.replay import _RECENT, _severities, spread_of
 from elevon.diagnose.roles.load import load_alike, read_load
 from elevon.diagnose.roles.log import _onset, role_log
 from elevon.diagnose.roles.numbers import numbers_of
@@ -322,3 +322,22 @@ def test_a_baseline_of_the_same_command_counts_as_it_stands(screw):
     first, same = read[0].matched(read[1:])
     assert first.repeats(same[0])
     np.testing.assert_array_equal(case.unit.mean, same[0].features.only(case.unit.names).values)
+
+
+def test_what_is_counted_is_run_at_each_count(screw):
+    """Two blocked channels are not the most that one can be."""
+    channel = chosen(["return_jam@screw.return_channel"], screw)[0]
+    np.testing.assert_array_equal(_severities(channel, 4, 3), np.arange(channel.high + 1.0))
+    assert channel.high >= 2.0
+
+
+def test_an_answer_by_roles_does_not_depend_on_earlier_ones(screw):
+    """A log of a command that is like this one's, not the same, lends it no runs."""
+    few = ["backlash@transmission"]
+    item, other = log(screw, day=2, start=0.3), log(screw, day=3, start=0.3)
+    like = replace(other, channels={**other.channels, "command": 1.02 * other["command"]})
+    _RECENT.clear()
+    alone = diagnose([item], screw, faults=few)
+    _RECENT.clear()
+    diagnose([like], screw, faults=few)
+    assert diagnose([item], screw, faults=few) == alone
