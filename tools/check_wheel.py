@@ -69,11 +69,17 @@ def main(folder: str) -> int:
             "run.parquet",
             fails=True,
         )
-        if "elevon[files]" not in output:
+        if f"elevon[files] @ {wheel.as_uri()}" not in output:
             raise SystemExit(f"a command without its extra does not name it: {output}")
-    print(
-        "simulate, list, show, export, bench, sessions and CSV work without extras and a compiler"
-    )
+        print("simulate, list, show, export, bench, sessions, CSV: without extras and a compiler")
+        everything = f"elevon[all] @ {wheel.as_uri()}"
+        run(python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", everything)
+        unit = ("--actuator", "torino-rotary")
+        run(elevon, "simulate", "torino-rotary", "--duration", "0.1", "--out", "run.parquet")
+        run(elevon, "simulate", "torino-rotary", "--duration", "0.1", "--plot", "run.html")
+        run(elevon, "bench", "run", "chirp", *unit, "--fidelity", "low", "--out", "logs")
+        run(elevon, "diagnose", "logs/chirp.csv", *unit, "--baseline", "logs/chirp.csv")
+        print("Parquet, pictures, diagnosis: with all extras, without a compiler")
     return 0
 
 
