@@ -38,7 +38,8 @@ def test_its_torque_constant_follows_its_supply(name, tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("name", "backlash"), [("linear-drive-28v", "0.1 mm"), ("robot-joint", "0.2 deg")]
+    ("name", "backlash"),
+    [("linear-drive-28v", "0.1 mm"), ("robot-joint", "0.2 deg"), ("valve", "0.5 deg")],
 )
 def test_from_its_numbers_to_the_answer(name, backlash, tmp_path, monkeypatch, capsys):
     """Bench, calibration on its own logs, a healthy day, one with backlash: as the page says."""

@@ -9,14 +9,15 @@ from string import Template
 from elevon.errors import InputError
 from elevon.parameters import SetFile
 
-_LONGEST = 4.0  # s of a cycle
+#: Longest cycle [s] of a ram and of a turning output.
+_LONGEST = {True: 2.0, False: 4.0}
 
 
 def scaled_procedure(loaded: SetFile) -> str:
     """Return the text of a procedure whose motions and loads suit an actuator's design.
 
     Sines reach half the rated speed, over a fifth of the stroke to either side at most, in cycles
-    of at most four seconds.
+    of at most two seconds (a ram) or four.
 
     Raises
     ------
@@ -31,11 +32,11 @@ def scaled_procedure(loaded: SetFile) -> str:
     linear = "lead" in value
     display = 1e3 if linear else 180.0 / math.pi
     speed = 0.5 * value["speed"]
-    amplitude = min(0.2 * value["stroke"], _LONGEST * speed / (2.0 * math.pi))
+    amplitude = min(0.2 * value["stroke"], _LONGEST[linear] * speed / (2.0 * math.pi))
     frequency = speed / (2.0 * math.pi * amplitude)
     small = 0.2 * amplitude
     numbers = {
-        "duration": 3.0 / frequency,
+        "duration": (4.0 if linear else 3.0) / frequency,
         "amplitude": amplitude * display,
         "frequency": frequency,
         "small": small * display,
