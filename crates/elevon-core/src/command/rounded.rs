@@ -1,4 +1,4 @@
-//! Triangles and trapezoids whose corners are rounded to a largest acceleration (docs/theory/ballscrew.md, "Profiles").
+//! Triangles and trapezoids whose corners are rounded to a largest acceleration (docs/explanation/theory/ballscrew.md, "Profiles").
 //!
 //! A corner at which the slope changes by D is replaced by a parabola over D/a about it: position and slope are continuous,
 //! the curve cuts the corner by D^2/(8 a). The motion begins from rest at its start, where half a parabola lies outside the

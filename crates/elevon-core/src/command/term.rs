@@ -38,7 +38,7 @@ pub struct Oscillation {
 }
 
 /// One cycle of a period sweep: a linear chirp from 1/T_k to 1/T_(k+1). Requiring the period at a cycle's start to be
-/// T_k = T_0 + q t_k gives T_k = T_0 rho^k in closed form (docs/theory/ballscrew.md, "Profiles").
+/// T_k = T_0 + q t_k gives T_k = T_0 rho^k in closed form (docs/explanation/theory/ballscrew.md, "Profiles").
 struct Cycle {
     begin: f64,
     period: f64,

@@ -1,4 +1,4 @@
-//! Where the speed controller's derivative action becomes unstable (docs/theory/derivative.md).
+//! Where the speed controller's derivative action becomes unstable (docs/explanation/theory/derivative.md).
 //!
 //! K_p T_d of the measured speed acts like an inertia: what counts is rho = K_p T_d / J. The current loop decides how much
 //! of it is borne.

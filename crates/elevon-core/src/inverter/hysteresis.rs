@@ -51,7 +51,7 @@ pub fn crossing<S: Scalar>(half_band: S, legs: [S; 3], start: [S; 3], end: [S; 3
 }
 
 /// Squares of the three phases' ripple under relays, summed, over the square of the band that the currents fill: of the limit
-/// cycle of three relays with a floating neutral, hardly dependent on voltage and speed (docs/theory/low-fidelity.md).
+/// cycle of three relays with a floating neutral, hardly dependent on voltage and speed (docs/explanation/theory/low-fidelity.md).
 const RIPPLE: f64 = 1.2;
 /// Overshoot behind a filter of the measured currents, over its time constant and V/L.
 const OVERSHOOT: f64 = 0.37;

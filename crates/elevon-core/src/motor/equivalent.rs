@@ -1,7 +1,7 @@
 //! The single equivalent phase of the reduced-order model (reference sheet 1.9): the quadrature current.
 //!
 //! A current-controlled drive imposes i_j = i_q sin a_j, so the three-phase model collapses to one phase
-//! whose coefficients depend on the rotor angle (derivation: docs/theory/low-fidelity.md):
+//! whose coefficients depend on the rotor angle (derivation: docs/explanation/theory/low-fidelity.md):
 //! k_T = sum k_j sin a_j, R_q = 2/3 sum R_j sin^2 a_j, L_q likewise, v_q = R_q i + L_q di/dt + 2/3 k_T omega.
 
 use crate::scalar::Scalar;

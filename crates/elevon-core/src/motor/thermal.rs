@@ -1,4 +1,4 @@
-//! Thermal network of a motor: winding, surface, ambient air (N 3.2, eq. 1; docs/theory/thermal.md).
+//! Thermal network of a motor: winding, surface, ambient air (N 3.2, eq. 1; docs/explanation/theory/thermal.md).
 //!
 //! The copper heat is summed by the inner loop; the network advances on its own tick with the mean heat of that tick, so
 //! no heat is lost between the clocks. Temperatures and the heat given away follow from the same flows: the energy

@@ -1,5 +1,5 @@
 //! The motor's bearing with a local defect, a worn cage, or more radial load than it was measured with
-//! (docs/theory/friction.md, "Bearings").
+//! (docs/explanation/theory/friction.md, "Bearings").
 //!
 //! Balls pass a defect as often as the geometry states (gamma = d/D cos alpha, Z balls, per turn of the shaft): outer ring
 //! Z/2 (1 - gamma), inner ring Z/2 (1 + gamma), a ball's defect on both rings D/d (1 - gamma^2), the cage turns

@@ -1,4 +1,4 @@
-//! Temperature of a screw's nut: its friction heats it, the air cools it (docs/theory/thermal.md, "The nut").
+//! Temperature of a screw's nut: its friction heats it, the air cools it (docs/explanation/theory/thermal.md, "The nut").
 //!
 //! One node on the tick of the motor's network: C dT/dt = P - (T - T_a)/R, backward Euler with the mean heat of the tick.
 

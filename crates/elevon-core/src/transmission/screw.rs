@@ -1,5 +1,5 @@
 //! Ball screw: efficiencies, preload, blocked return channels, starved and contaminated lubrication, spalls
-//! (docs/theory/ballscrew.md, "Screw" and "Faults").
+//! (docs/explanation/theory/ballscrew.md, "Screw" and "Faults").
 //!
 //! An actuator file gives the two efficiencies; they mean a friction coefficient on the inclined plane of the thread. Faults add
 //! to that coefficient, and the efficiencies follow. With nothing added the file's numbers are used unchanged.

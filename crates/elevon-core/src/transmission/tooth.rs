@@ -1,5 +1,5 @@
 //! Worn and chipped teeth of the gear: backlash that depends on the angle, and the transmission error it leaves
-//! (docs/theory/friction.md, "Gear teeth").
+//! (docs/explanation/theory/friction.md, "Gear teeth").
 //!
 //! Wear takes most where the flanks slide, away from the pitch point: over a mesh cycle the backlash grows by s sin^2(N theta/2),
 //! N meshes a turn. A chipped tooth opens it once a turn of its wheel, by b cos^2 over the mesh of that one tooth. The driven

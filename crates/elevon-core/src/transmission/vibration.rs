@@ -1,4 +1,4 @@
-//! An accelerometer on the nut's housing (docs/theory/ballscrew.md, "Vibration"): forces at the orders of the shaft through
+//! An accelerometer on the nut's housing (docs/explanation/theory/ballscrew.md, "Vibration"): forces at the orders of the shaft through
 //! one resonance of the structure, a second-order system with a state of its own.
 
 use crate::scalar::Scalar;

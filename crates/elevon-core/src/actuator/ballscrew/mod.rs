@@ -1,6 +1,6 @@
 //! The ballscrew actuator (NASA / Impact Technologies): the motor turns a screw, the nut and the ram travel along it, and
 //! a fixture with backlash couples the ram to a load side with mass, damping and friction of its own
-//! (docs/theory/ballscrew.md).
+//! (docs/explanation/theory/ballscrew.md).
 
 mod faults;
 mod records;

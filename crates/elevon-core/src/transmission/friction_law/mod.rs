@@ -1,4 +1,4 @@
-//! Laws of the dry friction of the motor shaft, chosen by `friction.law` (docs/theory/friction.md).
+//! Laws of the dry friction of the motor shaft, chosen by `friction.law` (docs/explanation/theory/friction.md).
 //!
 //! A law states how much dry friction there is: the limit at rest and the value when moving (`limits`). Laws without a state
 //! stick as Borello's does; a law with bristles moves shaft and bristles together (`lugre`).

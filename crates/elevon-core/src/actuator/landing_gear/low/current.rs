@@ -1,5 +1,5 @@
 //! Mean currents of a carrier period: the pair's, continuous or not, the third phase's, and of shorted windings
-//! (docs/theory/landing-gear.md).
+//! (docs/explanation/theory/landing-gear.md).
 
 use super::super::body::Body;
 use super::pair::Pair;
@@ -34,7 +34,7 @@ impl<S: Scalar> Lag<S> {
     }
 }
 
-/// Mean current over a carrier period after a step (`docs/theory/landing-gear.md`). The continuous current lags, and decays
+/// Mean current over a carrier period after a step (`docs/explanation/theory/landing-gear.md`). The continuous current lags, and decays
 /// towards what its circuit drives back; the pulses, which start from none in each period, do not.
 #[inline(always)]
 pub(super) fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, body: &State<S>, duty: S) -> S {

@@ -1,4 +1,4 @@
-//! The phase that left the pair: its current dies while the next takes over (docs/theory/landing-gear.md, "The outgoing
+//! The phase that left the pair: its current dies while the next takes over (docs/explanation/theory/landing-gear.md, "The outgoing
 //! phase").
 
 use super::pair::Pair;
@@ -20,7 +20,7 @@ pub(super) struct Handover<S> {
 
 kept!(Handover<f64> as Handover { outgoing, demand, change });
 
-/// Current that the phase which left the pair still carries, its mean over the step (docs/theory/landing-gear.md, "The
+/// Current that the phase which left the pair still carries, its mean over the step (docs/explanation/theory/landing-gear.md, "The
 /// outgoing phase"): L do/dt = -(v + (e - 2 h)/3) with the pair's EMF e, that of the incoming phase less that of the
 /// outgoing one h, and v from the rails.
 #[inline(always)]

@@ -1,4 +1,4 @@
-//! The controller of the reduced-order model: P, and PID whose derivative acts as inertia (docs/theory/low-fidelity.md, "The speed
+//! The controller of the reduced-order model: P, and PID whose derivative acts as inertia (docs/explanation/theory/low-fidelity.md, "The speed
 //! derivative as inertia"); or one PID on the position. Jumps of the speed error pass the derivative's filter (`jump.rs`).
 
 use super::jump::Jumps;

@@ -1,6 +1,6 @@
 //! The reduced-order model where one current does not stand for three: references turned away from the rotor by what the resolver
 //! shows, relays with an interrupted phase or unlike sensors, a carrier drive with an interrupted phase. The three windings
-//! are stepped behind mean leg voltages, exactly for voltages held over a part of a step (docs/theory/low-fidelity.md,
+//! are stepped behind mean leg voltages, exactly for voltages held over a part of a step (docs/explanation/theory/low-fidelity.md,
 //! "Three windings behind mean legs").
 
 use super::model::{Model, State, Structure};

@@ -1,4 +1,4 @@
-//! The equivalent phase at one rotor angle (docs/theory/low-fidelity.md, "From three phases to one").
+//! The equivalent phase at one rotor angle (docs/explanation/theory/low-fidelity.md, "From three phases to one").
 
 use super::control::Control;
 use super::model::{Model, State, Structure};

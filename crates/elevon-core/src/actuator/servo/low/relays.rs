@@ -1,5 +1,5 @@
 //! What the relays leave between the current and its reference, for the one phase and for the three windings
-//! (docs/theory/low-fidelity.md, "Two drives", "The speed derivative as inertia").
+//! (docs/explanation/theory/low-fidelity.md, "Two drives", "The speed derivative as inertia").
 
 use super::driven::{settled, DrivenState, Part};
 use super::model::{Model, State, Structure};

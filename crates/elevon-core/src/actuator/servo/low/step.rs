@@ -1,5 +1,5 @@
 //! One step of the reduced-order model: sensors, control electronics, equivalent phase, shaft. The derivative of the measured
-//! speed is solved with the acceleration (docs/theory/low-fidelity.md, "The speed derivative as inertia").
+//! speed is solved with the acceleration (docs/explanation/theory/low-fidelity.md, "The speed derivative as inertia").
 
 use super::control::{demand, integrate};
 use super::driven::driven_step;

@@ -1,4 +1,4 @@
-//! Rigid flanks under a load (docs/theory/rotary.md, "Backlash under load"): where a force or friction acts on the output,
+//! Rigid flanks under a load (docs/explanation/theory/rotary.md, "Backlash under load"): where a force or friction acts on the output,
 //! motor and output move as one while a flank carries, each by itself while they cross the backlash.
 
 use super::loads::Loads;
