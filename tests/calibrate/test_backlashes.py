@@ -8,9 +8,10 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate import read_logs
-from elevon.calibrate.backlash import _spans, _unloaded
+from elevon.calibrate.backlash import _spans, _unloaded, fit_backlash
 from elevon.calibrate.zeros import position_estimates
 from elevon.cli import main
+from elevon.logs.log import Log
 from tests.calibrate.foreign import NOLOAD, draw, run
 from tests.calibrate.foreign_files import Style, write_trial
 
@@ -52,6 +53,18 @@ def test_one_backlash_in_all_logs_is_one_estimate(logs):
     estimates, findings = position_estimates(logs[:1], Actuator.load("torino-rotary"))
     assert "backlash.total" in {item.path for item in estimates}
     assert findings == ()
+
+
+def test_a_motion_smaller_than_its_lag_shows_no_backlash():
+    """The output swings by more than the motor's way: nothing tells when the gap is crossed."""
+    time = np.arange(0.0, 10.0, 0.01)
+    swing = 0.01 * np.sin(2.0 * np.pi * 0.5 * time)
+    channels = {
+        "motor_position": 124.0 * swing,
+        "motor_speed": 124.0 * np.gradient(swing, time),
+        "output_position": -20.0 * np.gradient(swing, time),
+    }
+    assert fit_backlash([Log("small", time, channels)], 124.0, 1e-4) is None
 
 
 @pytest.mark.long

@@ -88,7 +88,7 @@ def fit_backlash(logs: Sequence[Log], ratio: float, count: float) -> BacklashFit
     Returns
     -------
     BacklashFit or None
-        None where no log has both positions and a reversal.
+        None where no log has both positions, a reversal, and a stroke wider than the lag.
     """
     used = [log for log in logs if _usable(log, ratio, count)]
     if not used:
@@ -97,6 +97,11 @@ def fit_backlash(logs: Sequence[Log], ratio: float, count: float) -> BacklashFit
     outputs = [log.output for log in used if log.has("output_position")]
     width, centre = _start(used, drivers, outputs)
     keeps = [_after_reversal(x, width) for x in drivers]
+    wide = [k for k, keep in enumerate(keeps) if keep.any()]
+    if not wide:
+        return None
+    if len(wide) < len(used):
+        return fit_backlash([used[k] for k in wide], ratio, count)
     speeds = [log.speed / ratio for log in used]
     scale = np.array([count, count, 1e-4, 1e-3])
 
