@@ -126,7 +126,6 @@ BAD = {
         (*RUN, "--record", "output_positon@400 Hz"),
         "did you mean 'output_position'",
     ),
-    "no rate": ((*RUN, "--record", "output_position"), "SIGNALS@RATE"),
     "zero rate": ((*RUN, "--record", "output_position@0 Hz"), "must be positive"),
     "unit of the rate": ((*RUN, "--record", "output_position@400 rad/s"), "expected a frequency"),
     "rate that does not divide": ((*RUN, "--record", "output_position@300 Hz"), "nearest: 299.94"),

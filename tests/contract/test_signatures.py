@@ -12,6 +12,7 @@ import pytest
 from elevon import _core
 
 PHYSICS = Path(__file__).resolve().parents[1] / "physics"
+UNIT = PHYSICS.parent / "control_unit"
 
 
 def owner(place: str) -> str:
@@ -35,10 +36,12 @@ def machines() -> list[str]:
 
 
 def files(wiring: str) -> list[Path]:
-    """Physics tests that speak of a wiring."""
-    files = {path: name for name in machines() for path in PHYSICS.glob(f"test_{name}*.py")}
+    """Physics tests that speak of a wiring; a control unit is a machine's of its own kind."""
+    units = dict.fromkeys(UNIT.glob("test_*.py"), "landing_gear")
+    named = {path: name for name in machines() for path in PHYSICS.glob(f"test_{name}*.py")}
     wanted = wiring if wiring in machines() else None
-    return [path for path in sorted(PHYSICS.glob("test_*.py")) if files.get(path) == wanted]
+    every = sorted([*PHYSICS.glob("test_*.py"), *units])
+    return [path for path in every if {**named, **units}.get(path) == wanted]
 
 
 def marked(wiring: str) -> Iterator[tuple[str, ...]]:
