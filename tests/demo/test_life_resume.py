@@ -1,6 +1,7 @@
 """An interrupted life goes on with what is finished, and ends as if it had not been interrupted."""
 
 import json
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,6 +16,7 @@ from elevon.demo.life.unit import demo_mission
 from elevon.prognose import ResponseTables
 from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
+from elevon.prognose.predict import prognosis
 from elevon.prognose.requirement import Requirement
 from elevon.report import Report
 from tests.patches import put
@@ -73,6 +75,7 @@ class Story:
             "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",
             "elevon.demo.life.figures.cone_figure": lambda _demo: None,
             "elevon.report.figures.save_figure": lambda *_args, **_options: None,
+            "elevon.demo.life.run.prognosis": partial(prognosis, particles=50),
         }
         for name, function in replaced.items():
             put(monkeypatch, name, function)

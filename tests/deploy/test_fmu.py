@@ -138,6 +138,21 @@ def test_a_state_is_saved_restored_and_branched(component, exported, version):
     assert first.release(state) == OK
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_setting_nothing_after_the_end_leaves_the_run(component, version):
+    """Found by a million random calls: the state saved then had no run."""
+    one = component(version=version)
+    assert one.begin() == OK
+    assert one.step(0.0, 2e-3) == OK
+    position = one.get("output_position")
+    assert one.call("Terminate") == OK
+    assert one.set_raw("Real" if version == "2.0" else "Float64", [], []) == OK
+    state = one.save()
+    assert one.restore(state) == OK
+    assert one.get("output_position") == position
+    assert one.release(state) == OK
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("fidelity", ["high", "low"])
 @pytest.mark.parametrize("name", NAMES)

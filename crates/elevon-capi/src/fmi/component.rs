@@ -269,7 +269,8 @@ impl Component {
             for (i, &reference) in references.iter().enumerate() {
                 self.note(reference, value(i));
             }
-            self.stale = true;
+            // Nothing set leaves the run as it is, also after the end.
+            self.stale |= !references.is_empty();
             return Ok(());
         }
         let Some(run) = &mut self.run else {
