@@ -75,7 +75,7 @@ class Story:
             "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",
             "elevon.demo.life.figures.cone_figure": lambda _demo: None,
             "elevon.report.figures.save_figure": lambda *_args, **_options: None,
-            "elevon.demo.life.run.prognosis": partial(prognosis, particles=50),
+            "elevon.prognose.predict.prognosis": partial(prognosis, particles=50),
         }
         for name, function in replaced.items():
             put(monkeypatch, name, function)

@@ -144,12 +144,12 @@ def test_setting_nothing_after_the_end_leaves_the_run(component, version):
     one = component(version=version)
     assert one.begin() == OK
     assert one.step(0.0, 2e-3) == OK
-    position = one.get("output_position")
+    before = one.outputs(["output_position"])
     assert one.call("Terminate") == OK
     assert one.set_raw("Real" if version == "2.0" else "Float64", [], []) == OK
     state = one.save()
     assert one.restore(state) == OK
-    assert one.get("output_position") == position
+    assert one.outputs(["output_position"]) == before
     assert one.release(state) == OK
 
 
