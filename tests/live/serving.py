@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import time
 import urllib.error
 import urllib.request
 from contextlib import contextmanager
+from pathlib import Path
 
 SINE = {"terms": [{"kind": "sine", "amplitude": "6 deg", "bias": "10 deg", "frequency": "0.5 Hz"}]}
 
@@ -35,6 +37,11 @@ class Bench:
         status, body, _ = self.request("state")
         assert status == 200
         return json.loads(body)
+
+    def memory(self):
+        """Resident bytes of the server's process (Linux)."""
+        text = Path(f"/proc/{self.process.pid}/statm").read_text("ascii")
+        return int(text.split()[1]) * resource.getpagesize()
 
     def act(self, headers=None, **message):
         status, body, _ = self.request("act", message, headers)

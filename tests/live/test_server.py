@@ -1,6 +1,8 @@
 """What the server promises: its first line, /state, /act, its limits, who may speak to it."""
 
 import json
+import socket
+import time
 
 import pytest
 from websockets.exceptions import InvalidStatus
@@ -182,11 +184,11 @@ def test_one_viewer_at_a_time_has_control(live):
 def test_snapshots_hold_the_signals_that_were_chosen(live):
     import struct
 
-    with _socket(live) as socket:
-        _viewer(socket)
-        socket.send(json.dumps({"watch": ["motor_speed", "none", "command"], "choice": 7}))
+    with _socket(live) as one:
+        _viewer(one)
+        one.send(json.dumps({"watch": ["motor_speed", "none", "command"], "choice": 7}))
         while True:
-            data = socket.recv(timeout=30)
+            data = one.recv(timeout=30)
             if isinstance(data, bytes):
                 time, _, wanted, choice, rows, columns = struct.unpack_from("<ddfIII", data)
                 if choice == 7 and rows:
@@ -200,26 +202,46 @@ def test_malformed_messages_leave_the_server_up(live):
     import random
 
     rng = random.Random(30)
-    with _socket(live) as socket:
-        _viewer(socket)
+    with _socket(live) as one:
+        _viewer(one)
         for _ in range(1000):
             text = "".join(rng.choice('{}[]":,0e-."watchcommandfault ') for _ in range(40))
-            socket.send(rng.choice([text, text.encode(), '{"watch": 3}', '{"factor": "x"}']))
+            one.send(rng.choice([text, text.encode(), '{"watch": 3}', '{"factor": "x"}']))
         errors = 0
         while errors < 1000:
-            data = socket.recv(timeout=30)
+            data = one.recv(timeout=30)
             errors += isinstance(data, str) and "error" in data
     assert live.state()["time"] > 0.0
 
 
 def test_a_viewer_that_hangs_slows_nobody(live):
-    with _socket(live, max_queue=1, close_timeout=0.1) as hanging, _socket(live) as socket:
+    with _socket(live, max_queue=1, close_timeout=0.1) as hanging, _socket(live) as other:
         _viewer(hanging)  # and reads no more
-        _viewer(socket)
+        _viewer(other)
         begin = live.state()["time"]
         for _ in range(20):
-            socket.recv(timeout=30)
+            other.recv(timeout=30)
         assert live.state()["time"] > begin
+
+
+@pytest.mark.long
+def test_full_buffers_of_a_viewer_cost_nothing(live):
+    """A viewer with a small buffer that reads nothing for 40 s: its snapshots are dropped."""
+    narrow = socket.create_connection(("127.0.0.1", int(live.address.rstrip("/").split(":")[-1])))
+    narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    watch = {"watch": [*live.state()["values"]][:12], "choice": 1}
+    hanging = _socket(live, sock=narrow, max_queue=1, close_timeout=0.1)
+    with hanging, _socket(live) as other:
+        for one in (hanging, other):
+            _viewer(one)
+            one.send(json.dumps(watch))
+        before, begin, count, size = live.memory(), time.monotonic(), 0, 0
+        while time.monotonic() < begin + 40.0:
+            packed = other.recv(timeout=5)
+            count, size = count + isinstance(packed, bytes), size + len(packed)
+    assert count > 20 * 40
+    assert size > 4e6  # more than the buffers of a connection hold
+    assert live.memory() - before < 2e6
 
 
 @needs_browser
