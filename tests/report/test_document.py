@@ -4,10 +4,11 @@ import re
 from html.parser import HTMLParser
 
 import pytest
+from markupsafe import Markup
 
 from elevon.errors import OutputExistsError
 from elevon.report import Check, Report, ReportTable, all_passed
-from elevon.report.figures import COLOURS, new_figure, save_figure
+from elevon.report.figures import COLOURS, new_figure, on_white, save_figure
 
 HOSTILE = '<script>alert("x")</script>&amp;'
 
@@ -160,3 +161,10 @@ def test_pages_of_one_folder_link_to_each_other(tmp_path):
     first = (tmp_path / "a b.html").read_bytes()
     Report("First <page>").save(tmp_path / "a b.html", force=True, links=False)
     assert (tmp_path / "a b.html").read_bytes() == first
+
+
+def test_a_drawing_of_its_own_is_an_svg_file():
+    """Also one that a page would take as it is."""
+    picture = on_white(Markup('<svg viewBox="0 0 1 1"><g/></svg>'))
+    assert picture.startswith("<svg ")
+    assert '<rect width="100%" height="100%" fill="#ffffff"/><g/>' in picture

@@ -155,7 +155,8 @@ def save_figure(
 
 def on_white(drawing: str) -> str:
     """Return an SVG element as a picture of its own: dark ink on white, on any page."""
-    dark = drawing.replace("<svg ", '<svg color="#1f2630" ', 1)
+    # As a plain text: in a `Markup` what is put in would be escaped.
+    dark = str(drawing).replace("<svg ", '<svg color="#1f2630" ', 1)
     return re.sub(
         r"(<svg[^>]*>)", r'\1<rect width="100%" height="100%" fill="#ffffff"/>', dark, count=1
     )
