@@ -72,12 +72,12 @@ unsafe fn on(run: *mut ElevonRun, work: impl FnOnce(&mut ElevonRun) -> c_int) ->
         return ELEVON_BUSY;
     }
     // SAFETY: whoever has set `busy` has the run to itself.
-    let held = unsafe { &mut *run };
-    let done = if held.lost { ELEVON_DEFECT } else { caught(|| work(held)).unwrap_or(ELEVON_DEFECT) };
+    let handle = unsafe { &mut *run };
+    let done = if handle.lost { ELEVON_DEFECT } else { caught(|| work(handle)).unwrap_or(ELEVON_DEFECT) };
     // SAFETY: as above; the work's borrow has ended.
-    let held = unsafe { &mut *run };
-    held.lost |= done == ELEVON_DEFECT;
-    held.busy.store(false, Ordering::Release);
+    let handle = unsafe { &mut *run };
+    handle.lost |= done == ELEVON_DEFECT;
+    handle.busy.store(false, Ordering::Release);
     done
 }
 
@@ -137,9 +137,9 @@ pub unsafe extern "C" fn elevon_create(document: *const c_char, run: *mut *mut E
     };
     let result = caught(|| made(text)).unwrap_or_else(|panicked| Err(format!("a defect of elevon: {}", panicked.0)));
     match result {
-        Ok(held) => {
+        Ok(handle) => {
             // SAFETY: not null, and the caller's.
-            unsafe { *run = Box::into_raw(held) };
+            unsafe { *run = Box::into_raw(handle) };
             ELEVON_OK
         }
         Err(reason) => {
@@ -172,7 +172,7 @@ pub unsafe extern "C" fn elevon_free(run: *mut ElevonRun) {
 #[no_mangle]
 pub unsafe extern "C" fn elevon_step(run: *mut ElevonRun, seconds: f64) -> c_int {
     // SAFETY: as the caller promises.
-    unsafe { on(run, |held| outcome(held.run.advance(seconds))) }
+    unsafe { on(run, |handle| outcome(handle.run.advance(seconds))) }
 }
 
 /// Holds an input at a value (SI) from now on.
@@ -181,8 +181,8 @@ pub unsafe extern "C" fn elevon_step(run: *mut ElevonRun, seconds: f64) -> c_int
 /// As `elevon_step`.
 #[no_mangle]
 pub unsafe extern "C" fn elevon_set_input(run: *mut ElevonRun, index: usize, value: f64) -> c_int {
-    let work = |held: &mut ElevonRun| match index < held.inputs.len() {
-        true => held.run.set_input(index, value).map_or_else(code, |()| ELEVON_OK),
+    let work = |handle: &mut ElevonRun| match index < handle.inputs.len() {
+        true => handle.run.set_input(index, value).map_or_else(code, |()| ELEVON_OK),
         false => ELEVON_ARGUMENT,
     };
     // SAFETY: as the caller promises.
@@ -195,8 +195,8 @@ pub unsafe extern "C" fn elevon_set_input(run: *mut ElevonRun, index: usize, val
 /// As `elevon_step`.
 #[no_mangle]
 pub unsafe extern "C" fn elevon_set_fault(run: *mut ElevonRun, index: usize, severity: f64) -> c_int {
-    let work = |held: &mut ElevonRun| match index < held.faults.len() {
-        true => held.run.set_severities(std::iter::once((index, severity))).map_or_else(code, |()| ELEVON_OK),
+    let work = |handle: &mut ElevonRun| match index < handle.faults.len() {
+        true => handle.run.set_severities(std::iter::once((index, severity))).map_or_else(code, |()| ELEVON_OK),
         false => ELEVON_ARGUMENT,
     };
     // SAFETY: as the caller promises.
@@ -209,12 +209,12 @@ pub unsafe extern "C" fn elevon_set_fault(run: *mut ElevonRun, index: usize, sev
 /// As `elevon_step`; `values` has room for `count` numbers.
 #[no_mangle]
 pub unsafe extern "C" fn elevon_read(run: *mut ElevonRun, values: *mut f64, count: usize) -> c_int {
-    let work = |held: &mut ElevonRun| {
-        if values.is_null() || count != held.outputs.len() {
+    let work = |handle: &mut ElevonRun| {
+        if values.is_null() || count != handle.outputs.len() {
             return ELEVON_ARGUMENT;
         }
         // SAFETY: not null, with room for them.
-        held.run.read(unsafe { std::slice::from_raw_parts_mut(values, count) });
+        handle.run.read(unsafe { std::slice::from_raw_parts_mut(values, count) });
         ELEVON_OK
     };
     // SAFETY: as the caller promises.
@@ -234,14 +234,14 @@ pub unsafe extern "C" fn elevon_describe(
     outputs: *mut usize,
     faults: *mut usize,
 ) -> c_int {
-    let work = |held: &mut ElevonRun| {
-        for (to, value) in [(time, held.run.time()), (solver_step, held.run.dt())] {
+    let work = |handle: &mut ElevonRun| {
+        for (to, value) in [(time, handle.run.time()), (solver_step, handle.run.dt())] {
             if !to.is_null() {
                 // SAFETY: not null, and the caller's.
                 unsafe { *to = value };
             }
         }
-        for (to, value) in [(inputs, held.inputs.len()), (outputs, held.outputs.len()), (faults, held.faults.len())] {
+        for (to, value) in [(inputs, handle.inputs.len()), (outputs, handle.outputs.len()), (faults, handle.faults.len())] {
             if !to.is_null() {
                 // SAFETY: not null, and the caller's.
                 unsafe { *to = value };
@@ -261,11 +261,11 @@ pub unsafe extern "C" fn elevon_describe(
 pub unsafe extern "C" fn elevon_find(run: *mut ElevonRun, what: c_int, name: *const c_char, index: *mut usize) -> c_int {
     // SAFETY: as the caller promises.
     let name = unsafe { given(name) };
-    let work = |held: &mut ElevonRun| {
+    let work = |handle: &mut ElevonRun| {
         let names = match what {
-            0 => &held.inputs,
-            1 => &held.outputs,
-            2 => &held.faults,
+            0 => &handle.inputs,
+            1 => &handle.outputs,
+            2 => &handle.faults,
             _ => return ELEVON_ARGUMENT,
         };
         match names.iter().position(|other| Some(other.as_str()) == name) {
@@ -287,12 +287,12 @@ pub unsafe extern "C" fn elevon_find(run: *mut ElevonRun, what: c_int, name: *co
 /// As `elevon_step`; `size` is valid.
 #[no_mangle]
 pub unsafe extern "C" fn elevon_state_size(run: *mut ElevonRun, size: *mut usize) -> c_int {
-    let work = |held: &mut ElevonRun| {
+    let work = |handle: &mut ElevonRun| {
         if size.is_null() {
             return ELEVON_ARGUMENT;
         }
         // SAFETY: not null, and the caller's.
-        unsafe { *size = held.run.state_size() };
+        unsafe { *size = handle.run.state_size() };
         ELEVON_OK
     };
     // SAFETY: as the caller promises.
@@ -305,12 +305,12 @@ pub unsafe extern "C" fn elevon_state_size(run: *mut ElevonRun, size: *mut usize
 /// As `elevon_step`; `bytes` has `size` bytes.
 #[no_mangle]
 pub unsafe extern "C" fn elevon_save(run: *mut ElevonRun, bytes: *mut u8, size: usize) -> c_int {
-    let work = |held: &mut ElevonRun| {
+    let work = |handle: &mut ElevonRun| {
         if bytes.is_null() {
             return ELEVON_ARGUMENT;
         }
         // SAFETY: not null, with `size` bytes.
-        held.run.save(unsafe { std::slice::from_raw_parts_mut(bytes, size) }).map_or_else(code, |_| ELEVON_OK)
+        handle.run.save(unsafe { std::slice::from_raw_parts_mut(bytes, size) }).map_or_else(code, |_| ELEVON_OK)
     };
     // SAFETY: as the caller promises.
     unsafe { on(run, work) }
@@ -322,12 +322,12 @@ pub unsafe extern "C" fn elevon_save(run: *mut ElevonRun, bytes: *mut u8, size: 
 /// As `elevon_step`; `bytes` has `size` bytes.
 #[no_mangle]
 pub unsafe extern "C" fn elevon_restore(run: *mut ElevonRun, bytes: *const u8, size: usize) -> c_int {
-    let work = |held: &mut ElevonRun| {
+    let work = |handle: &mut ElevonRun| {
         if bytes.is_null() {
             return ELEVON_ARGUMENT;
         }
         // SAFETY: not null, with `size` bytes.
-        held.run.restore(unsafe { std::slice::from_raw_parts(bytes, size) }).map_or_else(code, |()| ELEVON_OK)
+        handle.run.restore(unsafe { std::slice::from_raw_parts(bytes, size) }).map_or_else(code, |()| ELEVON_OK)
     };
     // SAFETY: as the caller promises.
     unsafe { on(run, work) }

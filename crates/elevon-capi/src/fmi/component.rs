@@ -1,9 +1,10 @@
 //! A component of a simulation as FMI has it, whatever the version: its life, its variables, its states. No pointer comes here.
 
+mod state;
+
 use crate::run::{Fault, Run, Verdict};
-use crate::spec::{digest, Kind, Spec, Variable};
+use crate::spec::{Kind, Spec, Variable};
 use crate::text::Text;
-use elevon_core::kept::{Kept, Store};
 
 /// Status of a call, by FMI's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +26,6 @@ pub enum Phase {
     Stepping,
     Terminated,
 }
-
-const PHASES: [Phase; 4] = [Phase::Instantiated, Phase::Initialising, Phase::Stepping, Phase::Terminated];
 
 /// In what form a variable's values are numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,8 +58,8 @@ pub struct Component {
     start: f64,
     /// The run stands and cannot go on.
     pub ended: bool,
-    /// A trip has been told.
-    told: bool,
+    /// The importer knows of the trip.
+    trip_reported: bool,
     pub text: Text,
 }
 
@@ -74,7 +73,7 @@ impl Component {
             phase: Phase::Instantiated,
             start: 0.0,
             ended: false,
-            told: false,
+            trip_reported: false,
             text: Text::default(),
         }
     }
@@ -183,7 +182,7 @@ impl Component {
         };
         match run.advance(step) {
             Ok(Verdict::Ok) => Ok(()),
-            Ok(Verdict::Tripped) => self.tell_trip(),
+            Ok(Verdict::Tripped) => self.report_trip(),
             Ok(Verdict::Overheated) => self.end(Status::Discard),
             Err(Fault::Ended) => self.end(Status::Error),
             Err(_) => self.refused(Status::Discard),
@@ -191,8 +190,8 @@ impl Component {
     }
 
     /// The first step after a trip states it.
-    fn tell_trip(&mut self) -> Done {
-        if std::mem::replace(&mut self.told, true) {
+    fn report_trip(&mut self) -> Done {
+        if std::mem::replace(&mut self.trip_reported, true) {
             return Ok(());
         }
         if let Some(run) = &mut self.run {
@@ -345,100 +344,6 @@ impl Component {
             Kind::Input(port) => self.spec.inputs[port] = Some(value),
             Kind::Fault(at) => self.spec.faults[at].severity = value,
             Kind::Time | Kind::Output(_) => {}
-        }
-    }
-}
-
-/// Length of what stands before a state: its digest, and that of the document.
-const HEADER: usize = 16;
-
-impl Component {
-    /// The whole component as bytes.
-    ///
-    /// # Errors
-    /// Values that cannot be together.
-    pub fn save(&mut self) -> Done<Vec<u8>> {
-        let mut count = Store::to(&mut []);
-        self.keep_outside(&mut count);
-        let mut bytes = vec![0; HEADER + count.at()];
-        self.keep_outside(&mut Store::to(&mut bytes[HEADER..]));
-        if let Some(run) = self.run.as_mut().filter(|_| !self.stale) {
-            let (begin, size) = (bytes.len(), run.state_size());
-            bytes.resize(begin + size, 0);
-            if run.save(&mut bytes[begin..]).is_err() {
-                return self.refused(Status::Error);
-            }
-        }
-        let mut head = [digest(&bytes[HEADER..]), self.document.identity];
-        head.keep(&mut Store::to(&mut bytes[..HEADER]));
-        Ok(bytes)
-    }
-
-    /// Are the bytes a state of this FMU, as it was written?
-    ///
-    /// # Errors
-    /// They are not.
-    pub fn check_state(&mut self, bytes: &[u8]) -> Done {
-        let mut head = [0_u64; 2];
-        let mut store = Store::from(bytes);
-        head.keep(&mut store);
-        let body = bytes.get(HEADER..).unwrap_or_default();
-        if store.sound() && head == [digest(body), self.document.identity] {
-            return Ok(());
-        }
-        self.say(Status::Error, format_args!("no state of this FMU, or a damaged one"))
-    }
-
-    /// Goes back, or forth, to a state of a component of the same document.
-    ///
-    /// # Errors
-    /// Bytes that are none.
-    pub fn restore(&mut self, bytes: &[u8]) -> Done {
-        self.check_state(bytes)?;
-        let body = bytes.get(HEADER..).unwrap_or_default();
-        let mut other = Self::new(self.document.clone());
-        let mut store = Store::from(body);
-        other.keep_outside(&mut store);
-        let (read, sound) = (store.at(), store.sound());
-        let rest = body.get(read..).unwrap_or_default();
-        if !sound {
-            return self.say(Status::Error, format_args!("the state has entries that cannot be"));
-        }
-        if !rest.is_empty() {
-            // Its bytes are as they were written: what fails now is a defect.
-            self.bring(&mut other, rest).map_err(|_| Status::Fatal)?;
-        }
-        *self = other;
-        Ok(())
-    }
-
-    /// Gives `other` the run that `state` describes: one made like this one's, where that fits.
-    fn bring(&mut self, other: &mut Self, state: &[u8]) -> Done {
-        let fitting = self.run.take().filter(|run| run.fits(&other.spec)).map_or_else(|| Run::new(&other.spec), Ok);
-        match fitting {
-            Ok(mut run) => {
-                let restored = run.restore(state);
-                self.text = run.text.clone();
-                (other.run, other.stale) = (Some(run), false);
-                restored.map_err(|_| Status::Error)
-            }
-            Err(reason) => self.say(Status::Error, format_args!("{reason}")),
-        }
-    }
-
-    /// All but the run itself.
-    fn keep_outside(&mut self, store: &mut Store) {
-        elevon_core::kept::keep_choice(&mut self.phase, &PHASES, store);
-        self.start.keep(store);
-        self.ended.keep(store);
-        self.told.keep(store);
-        self.spec.parameters.keep(store);
-        self.spec.seed.keep(store);
-        self.spec.prepared.keep(store);
-        self.spec.inputs.keep(store);
-        for fault in &mut self.spec.faults {
-            fault.severity.keep(store);
-            fault.attributes.iter_mut().for_each(|(_, value)| value.keep(store));
         }
     }
 }

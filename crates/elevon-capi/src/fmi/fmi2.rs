@@ -1,7 +1,7 @@
 //! FMI 2.0 for co-simulation.
 
 use super::component::{Form, Phase, Status};
-use super::instance::{self, folder, missing, on, row, row_mut, text, Instance, Logger, Logger2, Teller};
+use super::instance::{self, folder, missing, on, row, row_mut, text, Instance, Log, Logger, Logger2};
 use std::ffi::{c_char, c_int, c_void};
 
 type Handle = *mut c_void;
@@ -50,12 +50,12 @@ pub unsafe extern "C" fn fmi2Instantiate(
         None => (Logger::None, std::ptr::null_mut()),
     };
     // SAFETY: as FMI has it.
-    let (teller, token, address) = unsafe { (Teller::new(logger, environment, name), text(token), text(resources)) };
+    let (log, token, address) = unsafe { (Log::new(logger, environment, name), text(token), text(resources)) };
     if kind != CO_SIMULATION {
-        teller.tell(Status::Error, c"this FMU is for co-simulation alone");
+        log.write(Status::Error, c"this FMU is for co-simulation alone");
         return std::ptr::null_mut();
     }
-    Instance::make(teller, token, address.and_then(folder))
+    Instance::make(log, token, address.and_then(folder))
 }
 
 /// # Safety
@@ -70,7 +70,7 @@ pub unsafe extern "C" fn fmi2FreeInstance(c: Handle) {
 /// As FMI 2.0 has it.
 #[no_mangle]
 pub unsafe extern "C" fn fmi2SetDebugLogging(c: Handle, _on: c_int, _count: usize, _categories: *const *const c_char) -> c_int {
-    // SAFETY: as FMI has it. What is told is errors alone, always.
+    // SAFETY: as FMI has it. The logger gets errors alone, always.
     unsafe { on(c, |_| Ok(())) }
 }
 

@@ -1,7 +1,7 @@
 //! FMI 3.0 for co-simulation.
 
 use super::component::{Component, Form, Phase, Status};
-use super::instance::{self, missing, on, row, row_mut, text, Instance, Logger, Logger3, Teller};
+use super::instance::{self, missing, on, row, row_mut, text, Instance, Log, Logger, Logger3};
 use std::ffi::{c_char, c_int, c_void};
 use std::path::PathBuf;
 
@@ -31,12 +31,12 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
 ) -> Handle {
     let logger = logger.map_or(Logger::None, Logger::Three);
     // SAFETY: as FMI has it.
-    let (teller, token, path) = unsafe { (Teller::new(logger, environment, name), text(token), text(resources)) };
+    let (log, token, path) = unsafe { (Log::new(logger, environment, name), text(token), text(resources)) };
     if events {
-        teller.tell(Status::Error, c"this FMU has no event mode");
+        log.write(Status::Error, c"this FMU has no event mode");
         return std::ptr::null_mut();
     }
-    Instance::make(teller, token, path.map(PathBuf::from))
+    Instance::make(log, token, path.map(PathBuf::from))
 }
 
 /// # Safety
@@ -51,7 +51,7 @@ pub unsafe extern "C" fn fmi3FreeInstance(c: Handle) {
 /// As FMI 3.0 has it.
 #[no_mangle]
 pub unsafe extern "C" fn fmi3SetDebugLogging(c: Handle, _on: bool, _count: usize, _categories: *const *const c_char) -> c_int {
-    // SAFETY: as FMI has it. What is told is errors alone, always.
+    // SAFETY: as FMI has it. The logger gets errors alone, always.
     unsafe { on(c, |_| Ok(())) }
 }
 
@@ -188,17 +188,17 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(c: Handle, bytes: *const u8, si
 }
 
 /// What a step tells besides its status.
-struct Told {
+struct StepOutcome {
     event: *mut bool,
     terminate: *mut bool,
     early: *mut bool,
     time: *mut f64,
 }
 
-impl Told {
+impl StepOutcome {
     /// # Safety
     /// Null or valid, each.
-    unsafe fn tell(&self, x: &Component) {
+    unsafe fn write(&self, x: &Component) {
         // SAFETY: null or valid.
         unsafe {
             for (flag, value) in [(self.event, false), (self.terminate, x.ended), (self.early, false)] {
@@ -226,12 +226,12 @@ pub unsafe extern "C" fn fmi3DoStep(
     early: *mut bool,
     last: *mut f64,
 ) -> c_int {
-    let told = Told { event, terminate, early, time: last };
+    let outcome = StepOutcome { event, terminate, early, time: last };
     let work = |x: &mut Component| {
         let begun = x.phase == Phase::Stepping && !x.ended;
         let done = x.step(time, step);
         // SAFETY: as FMI has it.
-        unsafe { told.tell(x) };
+        unsafe { outcome.write(x) };
         // A run that comes to its end within the step has done what it could.
         if begun && x.ended && done == Err(Status::Discard) {
             return Err(Status::Warning);

@@ -1,4 +1,4 @@
-//! What an FMI call is given: an instance, alone; texts, rows of numbers; and the logger that is told what went wrong.
+//! What an FMI call is given: an instance, alone; texts, rows of numbers; and the logger that gets what went wrong.
 
 use super::component::{Component, Done, Status};
 use crate::spec::Spec;
@@ -20,14 +20,14 @@ pub enum Logger {
     Three(Logger3),
 }
 
-/// Who is told of errors, and by which name.
-pub struct Teller {
+/// Where errors go, and under which name.
+pub struct Log {
     logger: Logger,
     environment: *mut c_void,
     name: CString,
 }
 
-impl Teller {
+impl Log {
     /// # Safety
     /// The logger bears the environment; `name` is null or ends with a zero.
     pub unsafe fn new(logger: Logger, environment: *mut c_void, name: *const c_char) -> Self {
@@ -36,7 +36,7 @@ impl Teller {
         Self { logger, environment, name }
     }
 
-    pub fn tell(&self, status: Status, text: &CStr) {
+    pub fn write(&self, status: Status, text: &CStr) {
         let category = match status {
             Status::Ok | Status::Warning => c"logStatusWarning",
             Status::Discard => c"logStatusDiscard",
@@ -49,8 +49,8 @@ impl Teller {
         unsafe {
             match self.logger {
                 Logger::None => {}
-                Logger::Two(log) => log(self.environment, self.name.as_ptr(), status as c_int, category.as_ptr(), plain.as_ptr()),
-                Logger::Three(log) => log(self.environment, status as c_int, category.as_ptr(), text.as_ptr()),
+                Logger::Two(call) => call(self.environment, self.name.as_ptr(), status as c_int, category.as_ptr(), plain.as_ptr()),
+                Logger::Three(call) => call(self.environment, status as c_int, category.as_ptr(), text.as_ptr()),
             }
         }
     }
@@ -59,7 +59,7 @@ impl Teller {
 /// What `fmi2Component` and `fmi3Instance` point to.
 pub struct Instance {
     busy: AtomicBool,
-    teller: Teller,
+    log: Log,
     component: UnsafeCell<Component>,
 }
 
@@ -67,16 +67,16 @@ pub struct Instance {
 pub struct State(pub Vec<u8>);
 
 impl Instance {
-    /// An instance of the FMU whose resources lie in a folder; null, and the logger told, where there is none.
-    pub fn make(teller: Teller, token: Option<&str>, resources: Option<PathBuf>) -> *mut c_void {
+    /// An instance of the FMU whose resources lie in a folder; null, with a line to the logger, where there is none.
+    pub fn make(log: Log, token: Option<&str>, resources: Option<PathBuf>) -> *mut c_void {
         let made = caught(|| read(token, resources)).unwrap_or_else(|panicked| Err(format!("a defect of elevon: {}", panicked.0)));
         match made {
             Ok(spec) => {
                 let component = UnsafeCell::new(Component::new(spec));
-                Box::into_raw(Box::new(Self { busy: AtomicBool::new(false), teller, component })).cast()
+                Box::into_raw(Box::new(Self { busy: AtomicBool::new(false), log, component })).cast()
             }
             Err(reason) => {
-                teller.tell(Status::Error, &CString::new(reason).unwrap_or_default());
+                log.write(Status::Error, &CString::new(reason).unwrap_or_default());
                 std::ptr::null_mut()
             }
         }
@@ -97,23 +97,23 @@ fn read(token: Option<&str>, resources: Option<PathBuf>) -> Result<Spec, String>
     Ok(spec)
 }
 
-/// Does the work of a call, alone on its instance; what went wrong is told. A panic is fatal to the instance, not to the process.
+/// Does the work of a call, alone on its instance; what went wrong goes to the logger. A panic is fatal to the instance, not to the process.
 ///
 /// # Safety
 /// `instance` is null or of `Instance::make`, and not freed.
 pub unsafe fn on(instance: *mut c_void, work: impl FnOnce(&mut Component) -> Done) -> c_int {
-    let held: *mut Instance = instance.cast();
-    if held.is_null() {
+    let shared: *mut Instance = instance.cast();
+    if shared.is_null() {
         return Status::Error as c_int;
     }
-    // SAFETY: of `Instance::make`; what is shared is an atomic and the teller.
-    let held = unsafe { &*held };
-    if held.busy.swap(true, Ordering::Acquire) {
-        held.teller.tell(Status::Error, c"another thread is at work on the instance; it bears one at a time");
+    // SAFETY: of `Instance::make`; what is shared is an atomic and the log.
+    let shared = unsafe { &*shared };
+    if shared.busy.swap(true, Ordering::Acquire) {
+        shared.log.write(Status::Error, c"another thread is at work on the instance; it bears one at a time");
         return Status::Error as c_int;
     }
     // SAFETY: whoever has set `busy` has the component to itself.
-    let component = unsafe { &mut *held.component.get() };
+    let component = unsafe { &mut *shared.component.get() };
     let status = match caught(|| work(component)) {
         Ok(Ok(())) => Status::Ok,
         Ok(Err(status)) => status,
@@ -124,9 +124,9 @@ pub unsafe fn on(instance: *mut c_void, work: impl FnOnce(&mut Component) -> Don
         }
     };
     if status != Status::Ok {
-        held.teller.tell(status, component.text.as_c());
+        shared.log.write(status, component.text.as_c());
     }
-    held.busy.store(false, Ordering::Release);
+    shared.busy.store(false, Ordering::Release);
     status as c_int
 }
 
