@@ -6,7 +6,17 @@ from elevon.cli.runner import app
 from studies.commands import app as studies
 
 #: Options by which a command is told where to write.
-OUTPUTS = {"--out", "--report", "--plot", "--svg", "--schema", "--picture", "--table", "--runs"}
+OUTPUTS = {
+    "--out",
+    "--report",
+    "--plot",
+    "--svg",
+    "--schema",
+    "--picture",
+    "--table",
+    "--runs",
+    "--append",
+}
 
 
 def commands():

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elevon.cli import common
-from elevon.cli.output import answer, listed, print_table
+from elevon.cli.output import answer, listed, print_table, say
 from elevon.cli.shell import Answer, command
 from elevon.errors import InputError
 from elevon.number_text import severity_texts
 
 if TYPE_CHECKING:
     from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.prognose.append import NextEntry
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -45,7 +46,18 @@ def diagnose(
     false_alarm: Annotated[
         float, typer.Option("--false-alarm", help="Rate of healthy logs called faulty.")
     ] = 0.05,
+    append: Annotated[
+        Path | None,
+        typer.Option(
+            "--append", metavar="HISTORY", help="Add the answer to this folder of inspections."
+        ),
+    ] = None,
+    usage: Annotated[
+        str | None,
+        typer.Option("--usage", metavar="N", help="Use at it; the first one as '600 flights'."),
+    ] = None,
     settings: common.SetOption = None,
+    force: common.ForceOption = False,
 ) -> Answer:
     """Diagnose the unit that wrote the logs, all in one condition."""
     from elevon.diagnose.door import diagnose as run
@@ -53,12 +65,36 @@ def diagnose(
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"--false-alarm {false_alarm:g}: must be between 0 and 1")
     model = common.read_actuator(actuator, settings)
+    inspection = _inspection(append, usage, model.name, force=force)
     result = run(
         common.read_logs(logs, column_map, loadcell, command), model,
         common.read_logs(baseline or [], column_map), method=method,
         surrogate=surrogate, faults=fault, false_alarm=false_alarm,
     )  # fmt: skip
-    return Answer(result, lambda: _print(result), page=result.report)
+    code = 0 if inspection is None else _append(inspection, result)
+    return Answer(result, lambda: _print(result), code, page=result.report)
+
+
+def _inspection(
+    history: Path | None, usage: str | None, actuator: str, *, force: bool
+) -> NextEntry | None:
+    """Return where the answer is added; refused before the work where it cannot be."""
+    from elevon.prognose.append import next_entry
+
+    if history is None and usage is None:
+        return None
+    if history is None or usage is None:
+        raise InputError("--append HISTORY and --usage N go together: a use is that of a history")
+    return next_entry(history, usage, actuator, force=force)
+
+
+def _append(inspection: NextEntry, result: Diagnosis) -> int:
+    try:
+        say(f"added: {inspection.write(result)}")
+    except InputError as error:
+        say(f"elevon: {error}")
+        return 1
+    return 0
 
 
 def _print(result: Diagnosis) -> None:

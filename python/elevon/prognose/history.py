@@ -26,6 +26,7 @@ from elevon.prognose.measured import read_measured
 from elevon.prognose.mission import UNITS_OF_USE
 from elevon.prognose.observation import Inspection, inspection
 from elevon.prognose.predict import check_order
+from elevon.results import finite
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -161,25 +162,31 @@ def read_history(folder: str | Path, *, unit: str) -> History:
         A file that is not JSON, or a stamp that is not one.
     """
     place = Path(folder).expanduser()
+    history = entries_of(place)
+    if not history.entries:
+        raise InputError(
+            f"{place}: no inspections: no *.json in it has the key 'usage' "
+            "(elevon diagnose --append HISTORY --usage N writes one)"
+        )
+    if history.unit != unit:
+        raise InputError(f"{place}: is counted in {history.unit}, the mission in {unit}")
+    return history
+
+
+def entries_of(place: Path) -> History:
+    """Return the inspections of a folder, none or more, in whatever unit of use."""
     if not place.is_dir():
         raise InputError(f"{place}: is not a folder")
     entries = [e for path in visible(place, "*.json") if (e := _entry(path)) is not None]
-    if not entries:
-        raise InputError(
-            f"{place}: no inspections: no *.json in it has the key 'usage' "
-            "(the JSON of `elevon diagnose` with `usage` and `unit` added)"
-        )
     read = [entry for entry, _ in entries]
     _one(place, "unit of use", {e.path.name: u for e, u in entries}, "histories are not mixed")
-    used = entries[0][1]
-    if used != unit:
-        raise InputError(f"{place}: is counted in {used}, the mission in {unit}")
     serials = {e.path.name: e.serial for e in read if e.serial}
     _one(place, "unit", serials, "a history is that of one unit")
     dated = sorted(
         read, key=lambda e: (e.date, e.usage) if all(x.date for x in read) else ("", e.usage)
     )
     check_order([Inspection(e.usage, {}, (), e.path.name, e.date) for e in dated])
+    unit = entries[0][1] if entries else ""
     return History(tuple(dated), unit, next(iter(serials.values()), ""))
 
 
@@ -350,4 +357,5 @@ def write_stamp(
         stamp["serial"] = serial
     if date:
         stamp["date"] = date
-    return write_text(path, json.dumps({**stamp, **data}, indent=1) + "\n", force=force)
+    text = json.dumps(finite({**stamp, **data}, words=True), allow_nan=False, indent=1)
+    return write_text(path, text + "\n", force=force)
