@@ -27,7 +27,7 @@ CAPI := $(BIN)/python tools/capi.py
 DEMO := $(BIN)/elevon demo --out out/demo --force
 
 .DELETE_ON_ERROR:
-.PHONY: help setup capi demo check test test-rust test-python test-long lint size stubs docs wheel sdist bench format lock audit licences clean
+.PHONY: help setup beginnings capi demo check test test-rust test-python test-long lint size stubs docs wheel sdist bench format lock audit licences clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -43,7 +43,16 @@ $(STAMPS)/packages: requirements.lock | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/extension: $(STAMPS)/packages pyproject.toml $(RUST_SOURCES)
+# The core needs no package, and compiles while they install.
+$(STAMPS)/core: $(RUST_SOURCES)
+	cargo build --release --locked --quiet --package elevon-core
+	@mkdir -p $(STAMPS) && touch $@
+
+beginnings: $(STAMPS)/core $(STAMPS)/packages
+	@:
+
+$(STAMPS)/extension: requirements.lock pyproject.toml $(RUST_SOURCES)
+	@$(MAKE) --no-print-directory --jobs=2 beginnings
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --locked
 	$(CAPI)
 	@touch $@
