@@ -1,5 +1,7 @@
 """Stands for linear actuators: which is chosen, what the rod gets, what the recorder writes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,22 @@ def test_friction_of_the_load_actuator_shows_until_the_loop_rejects_it():
 def test_more_than_the_load_actuator_has_is_refused():
     with pytest.raises(InputError, match="60000 N"):
         LOOP.achieved(TIME, np.full_like(TIME, 6e4), np.zeros_like(TIME))
+
+
+def test_a_drive_is_loaded_within_what_it_holds():
+    """Its largest force is half of the thrust at the current limit, where a procedure has more."""
+    drive = Actuator.load(Path(__file__).parents[2] / "examples" / "linear-drive" / "drive.toml")
+    thrust = 6.0 * 0.05 * 5.0 * 2.0 * np.pi / 5e-3  # current, torque constant, gearbox, lead
+    largest = {"sine-opposing": 4500.0, "trapezoid-spring": 90e3 * 0.05, "sweep-constant": 2000.0}
+    logs = stand_setups(load_procedure("ballscrew-profiles"), drive)
+    factor = {item.trace.name: item.factor for item in logs}
+    assert factor["sine-free"] == 1.0
+    for name, force in largest.items():
+        assert factor[name] * force == pytest.approx(0.5 * thrust, rel=1e-6)
+    assert "holds 1885 N" in logs[-1].message
+    assert logs[-1].truth()["force_factor"] == factor["sweep-constant"]
+    strong = stand_setups(load_procedure("ballscrew-heating"), Actuator.load("nasa-ballscrew"))
+    assert [(item.factor, item.message) for item in strong] == [(1.0, "")] * len(strong)
 
 
 def test_target_force_is_of_direction_spring_and_position():

@@ -14,6 +14,7 @@ from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop, target_force
 from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
+from elevon.bench.rating import SHARE, holds, rated_factor
 from elevon.bench.rig import Conditions, draw_conditions, moved
 from elevon.bench.stand import Stand
 from elevon.errors import DivergedError, InputError
@@ -51,6 +52,8 @@ class LoadedSetup:
         What the load actuator is commanded; None: nothing, or the rig moves the output.
     settings : dict
         What the operator set, by parameter.
+    factor : float
+        Of the commanded force: below one where the drive could not hold what is asked for.
     """
 
     trace: TraceStep
@@ -60,6 +63,17 @@ class LoadedSetup:
     stand: Stand
     force: ForceStep | None
     settings: dict[str, Any]
+    factor: float = 1.0
+
+    @property
+    def message(self) -> str:
+        """What the operator changed of the procedure."""
+        if self.factor == 1.0:
+            return ""
+        return (
+            f"loads times {self.factor:.3g}: {self.actuator.name} holds "
+            f"{holds(self.actuator):.4g} N, and is loaded by {100 * SHARE:g} % of it at most"
+        )
 
     def truth(self) -> dict[str, object]:
         """Return what the log does not state."""
@@ -73,6 +87,7 @@ class LoadedSetup:
             "faults": [fault.to_dict() for fault in self.scenario.fault],
             "force": None if self.force is None else self.force.model_dump(mode="json"),
             "rate": self.stand.hertz(self.trace.rate),
+            **({} if self.factor == 1.0 else {"force_factor": self.factor}),
         }
 
 
@@ -107,8 +122,11 @@ def loaded_setups(
             ready = actuator.with_values(settings, source="set on the bench", place=step.name)
             scenario = _scenario(step, ready, rig, conditions, faults)
             force_step = None if rig else force
+            factor = _rated(force_step, step, ready, conditions)
             logs.append(
-                LoadedSetup(step, ready, scenario, conditions, stand, force_step, dict(settings))
+                LoadedSetup(
+                    step, ready, scenario, conditions, stand, force_step, dict(settings), factor
+                )
             )
         else:
             raise InputError(
@@ -116,6 +134,18 @@ def loaded_setups(
                 f"{'rig, ' if 'rig_speed' in stand.ports else ''}settings, trace"
             )
     return logs
+
+
+def _rated(
+    force: ForceStep | None, step: TraceStep, actuator: Actuator, conditions: Conditions
+) -> float:
+    """Return the factor of the loads with which the drive holds them."""
+    most = SHARE * holds(actuator)
+    if force is None or step.command.mode != "position" or not np.isfinite(most):
+        return 1.0
+    times = np.arange(0.0, parse_quantity(step.duration, "s", "duration"), 10.0 * _GRID)
+    terms = _values(force.terms, times, conditions.start)
+    return rated_factor(force, terms, _values(step.command.terms, times, 0.0, "m"), most)
 
 
 def _scenario(
@@ -241,6 +271,7 @@ def _meta(setup: LoadedSetup, run: Recording) -> dict[str, Any]:
             "name": setup.stand.name,
             "text": setup.stand.text,
             "parameters": setup.settings,
+            **({} if setup.factor == 1.0 else {"force_factor": setup.factor}),
             "initial": dict(setup.trace.initial),
             "rig_moves": bool(setup.scenario.loads.rig_speed.terms),
         },
@@ -280,7 +311,7 @@ def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
         np.interp(times, clock, run[name].values) for name in ("output_position", "output_speed")
     )
     terms = _values(setup.force.terms, times, setup.conditions.start)
-    force_step = target_force(setup.force, terms, position, speed)
+    force_step = setup.factor * target_force(setup.force, terms, position, speed)
     return ForceLoop.of(setup.stand.force).achieved(times, force_step, speed)
 
 

@@ -272,6 +272,8 @@ def _one(
         recording = _drive_run(setup, fidelity, progress)
         written = write_traces(folder, setup, recording, layout, force=again)
     status, message = str(recording.meta["status"]), str(recording.meta["message"])
+    if isinstance(setup, LoadedSetup):
+        message = "; ".join(filter(None, (message, setup.message)))
     files = tuple(written)
     state.note(name, status, message, files)
     return BenchLogFiles(name, status, files, False, message), float(recording.meta["sim_s"])
