@@ -85,6 +85,8 @@ ANSWERS = {
                         "--test-units", "2"), r"^trained: own\.npz", (), True),
     "live": (("--fidelity", "low", "--static", "page"), r"^7 files in page$", (), True),
     "demo": (("--part", "bench", "--out", "demo"), r"^\d+ of \d+ checks passed$", (), True),
+    "reproduce": (("--all", "--only", "torino-compliance", "--out", "index"),
+                  r"^pass: 7 pass, 0 fail, 0 not run, of 1 cases$", (), True),
     "reproduce low-fidelity": ((), r"^(pass|fail): \d+ of \d+ checks$", (), True),
     "reproduce torino-compliance": ((), r"^(pass|fail): \d+ of \d+ checks$", (), False),
 }  # fmt: skip

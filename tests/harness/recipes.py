@@ -205,6 +205,8 @@ RECIPES = {
                    points=4),
     "demo": Recipe(("--part", "bench", "--out", "demo", "--force"), long=True, points=2,
                    code=(0, 1)),
+    "reproduce": Recipe(("--all", "--only", "torino-compliance", "--out", "index", "--force"),
+                        long=True, points=12),
     "reproduce torino-compliance": Recipe(("--out", "rep", "--force"), code=(0, 1), before=(
         ("reproduce", "torino-compliance", "--out", "rep", "--seed", "3"),)),
     "reproduce pisa-hydraulic": Recipe(("--out", "rep", "--force"), code=(0, 1), long=True,

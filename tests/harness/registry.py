@@ -26,6 +26,8 @@ def commands():
         if not hasattr(command, "list_commands"):
             yield " ".join(words), command
             return
+        if words and command.invoke_without_command:  # it works by itself, too
+            yield " ".join(words), command
         context = typer.Context(command)
         for name in command.list_commands(context):
             yield from walk(command.get_command(context, name), [*words, name])

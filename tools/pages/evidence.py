@@ -7,12 +7,15 @@ from pathlib import Path
 
 from records import code, plain, table
 
+from elevon.reproduce.catalogue import PublishedWork, published, works
+
 
 def pages(root: Path) -> Iterator[tuple[str, str]]:
     """Yield name and text of each page."""
     runs = root / "docs" / "evidence" / "runs"
     yield "evidence/judged-runs.md", judged(runs / "judged.csv")
     yield "evidence/published-cases.md", cases(sorted(runs.glob("*.json")))
+    yield "evidence/published-items.md", items()
 
 
 def judged(path: Path) -> str:
@@ -40,9 +43,39 @@ def cases(paths: list[Path]) -> str:
             f"## {path.stem}\n\n`{run['command']}`, {run['date']}, commit `{run['commit']}`.\n\n"
         )
         head = list(run["checks"][0])
-        rows = [[cell(check[key]) for key in head] for check in run["checks"]]
+        rows = [[cell(check.get(key)) for key in head] for check in run["checks"]]
         text += table([plain(key) for key in head], rows) + "\n"
     return text
+
+
+def items() -> str:
+    """Return the page of every table and figure of the works, with the command that makes it."""
+    text = (
+        "# Every published table and figure\n\nWhat the works print, item by item, and the command "
+        "that makes it, or why none does. `elevon reproduce --all --out DIR` runs every case.\n\n"
+    )
+    for work in works():
+        made = sum(bool(item.commands) for item in work.items)
+        rows = [
+            [plain(i.name), plain(i.text), ", ".join(map(code, i.commands)), plain(i.why)]
+            for i in work.items
+        ]
+        head = ["item", "what it shows", "command", "why none, or what differs"]
+        text += f"## {plain(work.title)}\n\n{made} of {len(rows)} are made by a command.\n\n"
+        text += f"{table(head, rows)}\n{sections(work)}"
+    return text
+
+
+def sections(work: PublishedWork) -> str:
+    """Return the list of cases that recompute what a work says in its text."""
+    lines = [
+        f"* {judged.item.partition(' ')[2]}: {code(f'elevon reproduce {record.name}')}"
+        for record in published().values()
+        for judged in record.checks
+        if judged.item.startswith(f"{work.name} Section")
+    ]
+    unique = "\n".join(dict.fromkeys(lines))
+    return f"Of the text:\n\n{unique}\n\n" if lines else ""
 
 
 def cell(value: object) -> str:

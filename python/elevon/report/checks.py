@@ -26,6 +26,8 @@ class Check(Plain):
         Unit of both, as shown.
     at_least : bool
         Whether `limit` is the smallest allowed value instead of the largest.
+    ours : float, optional
+        What the work itself found, where `value` is its distance from a printed number.
     """
 
     COMPUTED = ("passed",)
@@ -35,6 +37,7 @@ class Check(Plain):
     limit: float
     unit: str = ""
     at_least: bool = False
+    ours: float | None = None
 
     @property
     def passed(self) -> bool:

@@ -32,7 +32,8 @@ class ReportTable:
     columns : sequence of str
         Headings.
     rows : sequence of sequences
-        Cells; floats are shown with `digits` significant digits, True and False as yes and no.
+        Cells; floats are shown with `digits` significant digits, True and False as yes and no;
+        `markupsafe.Markup` stands as it is.
     caption : str
         One sentence under the table.
     digits : int
@@ -63,6 +64,8 @@ class ReportTable:
             return "yes" if value else "no"
         if isinstance(value, float):
             return f"{value:#.{self.digits}g}".rstrip(".")
+        if hasattr(value, "__html__"):  # a link, escaped by whoever made it
+            return value  # type: ignore[return-value]
         return "" if value is None else str(value)
 
     def heading(self) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import typer
 
 from elevon.cli.groups import NamingGroup, UsageError
+from elevon.cli.reproduce.all_cases import reproduce_all
 from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cases import CASES
 
@@ -45,10 +46,6 @@ app = typer.Typer(
 )
 
 
-@app.callback()
-def _group() -> None:
-    """Recompute a published table or figure; exit code 1 when a check fails."""
-
-
+app.callback(invoke_without_command=True)(reproduce_all)
 for _case in CASES:
     add_command(app, _case)

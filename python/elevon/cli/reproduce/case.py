@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.reproduce.catalogue import Published, published
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -80,6 +81,15 @@ class PublishedCase:
             common["seed"] = (_SEED, 0)
         return {**common, **self.options}
 
+    @property
+    def published(self) -> Published | None:
+        """What it recomputes of the published works; None for what no work prints."""
+        return published().get(self.name)
+
+    def defaults(self) -> dict[str, Any]:
+        """Return its options as they are when none is given."""
+        return {name: default for name, (_, default) in self.signature().items()}
+
     def call(self, function: str, *arguments: Any, **options: Any) -> Any:
         """Call a function by its name, with the options that it has arguments for."""
         module, _, name = function.partition(":")
@@ -115,14 +125,8 @@ def _run(case: PublishedCase, options: Options) -> int:
     if out is not None:  # before the work, not after it
         check_file(out / "report.html", options)
         check_file(out / "rows.csv", options)
-    if case.prepare is not None:
-        case.prepare(options)
     with progress_bar(case.title) as advance:
-        result = case.call(case.work, **options, progress=advance)
-    values: Values = result.to_dict()
-    if out is not None:
-        report = case.call(case.page, result, **options)
-        _write(out, report, values["rows"], options["force"])
+        result, values = compute(case, options, advance)
     if case.finish is not None:
         case.finish(result, options)
     if options["as_json"]:
@@ -134,6 +138,19 @@ def _run(case: PublishedCase, options: Options) -> int:
         if case.show is not None:
             case.show(values, result)
     return 0 if values["status"] == "pass" else 1
+
+
+def compute(case: PublishedCase, options: Options, progress: Any) -> tuple[Any, Values]:
+    """Return a case's result and its JSON object; the report and the rows are written."""
+    if case.prepare is not None:
+        case.prepare(options)
+    result = case.call(case.work, **options, progress=progress)
+    values: Values = result.to_dict()
+    out: Path | None = options.get("out")
+    if out is not None and case.page:
+        report = case.call(case.page, result, **options)
+        _write(out, report, values["rows"], options["force"])
+    return result, values
 
 
 def check_file(path: Path | None, options: Options) -> None:

@@ -1,0 +1,258 @@
+"""Every published case in one folder: one index of rows, ours beside theirs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from elevon.errors import ElevonError, Interrupted
+from elevon.files import check_output, write_text
+from elevon.progress import Progress, part
+from elevon.report.checks import Check
+from elevon.reproduce.catalogue import Judgement, Published
+from elevon.results import finite
+from elevon.worklog import Item, finished, sweep
+
+PASS, FAIL, NOT_RUN = "pass", "fail", "not run"
+_INDEX = ("index.html", "index.json")
+
+
+@dataclass(frozen=True, slots=True)
+class IndexRow:
+    """One check of one case beside what is printed.
+
+    Attributes
+    ----------
+    paper, item : str
+        The work; its table or figure.
+    case, check : str
+        The command; the check's name.
+    ours : float or None
+        The number found; None where the case was not run.
+    theirs : str
+        What is printed, with its unit; empty where nothing is.
+    limit : str
+        What the check's value is held to.
+    verdict : str
+        ``pass``, ``fail`` or ``not run``.
+    reason : str
+        Why, where it is not ``pass``.
+    definition : str
+        What the value is and where the limit comes from.
+    link : str
+        Page of the case within the folder; empty: none.
+    """
+
+    paper: str
+    item: str
+    case: str
+    check: str
+    ours: float | None
+    theirs: str
+    limit: str
+    verdict: str
+    reason: str
+    definition: str
+    link: str
+
+
+@dataclass(frozen=True, slots=True)
+class CaseRun:
+    """A case that can be run.
+
+    Attributes
+    ----------
+    record : Published
+        What it recomputes.
+    work : callable
+        Takes a folder and a progress, writes its files there, returns its JSON object.
+    absent : str
+        Why it cannot be run here; empty: it can.
+    """
+
+    record: Published
+    work: Callable[[Path, Progress | None], Mapping[str, Any]]
+    absent: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class EveryCase:
+    """Rows of every published case."""
+
+    rows: tuple[IndexRow, ...]
+    checks: tuple[Check, ...]
+    seed: int
+
+    @property
+    def status(self) -> str:
+        """``fail`` where a row is, else ``pass``: what was not run is no failure."""
+        return FAIL if any(row.verdict == FAIL for row in self.rows) else PASS
+
+    def count(self, verdict: str) -> int:
+        """Return how many rows have a verdict."""
+        return sum(row.verdict == verdict for row in self.rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object: status, checks, rows, how many rows of each verdict."""
+        import elevon
+
+        return {
+            "status": self.status,
+            "checks": [check.to_dict() for check in self.checks],
+            "summary": {verdict: self.count(verdict) for verdict in (PASS, FAIL, NOT_RUN)},
+            "rows": [asdict(row) for row in self.rows],
+            "seed": self.seed,
+            "version": elevon.__version__,
+        }
+
+
+def reproduce_everything(
+    cases: Sequence[CaseRun],
+    folder: Path,
+    *,
+    seed: int,
+    key: str,
+    force: bool = False,
+    date: str | None = None,
+    progress: Progress | None = None,
+) -> EveryCase:
+    """Run every case and write ``index.json`` and ``index.html``; what is finished is kept.
+
+    Parameters
+    ----------
+    cases : sequence of CaseRun
+        In the order of the index.
+    folder : Path
+        Each case has its own below it.
+    seed : int
+        As the cases were given it.
+    key : str
+        Tells this work from any other: a folder of other work is not gone on with.
+    force : bool
+        Whether the index of other work may be replaced.
+    date : str, optional
+        Printed on the page.
+    progress : callable, optional
+        Takes the done fraction.
+
+    Raises
+    ------
+    OutputExistsError
+        The folder has an index of other work.
+    BusyError, OutputError
+        As `elevon.worklog.finished`.
+    """
+    if not _same_work(folder, key):
+        for name in _INDEX:
+            check_output(folder / name, force=force)
+    total = sum(case.record.seconds for case in cases)
+    done, rows, checks = 0.0, [], []
+    with finished(folder, key) as log:
+        assert log is not None
+        sweep(folder)
+        for case in cases:
+            share = part(progress, done / total, (done + case.record.seconds) / total)
+            more = _run(case, folder, log, share)
+            done += case.record.seconds
+            rows += more[0]
+            checks += more[1]
+            if progress is not None:
+                progress(min(done / total, 1.0))
+        result = EveryCase(tuple(rows), tuple(checks), seed)
+        text = json.dumps(finite(result.to_dict()), allow_nan=False, indent=1)
+        from elevon.reproduce.everything_page import index_page
+
+        write_text(folder / "index.json", text + "\n", force=True)
+        index_page(result, date).save(folder / "index.html", force=True, links=False)
+    return result
+
+
+def _same_work(folder: Path, key: str) -> bool:
+    """Whether a folder's log is that of this work."""
+    from elevon import __version__
+    from elevon.worklog import WorkLog
+
+    log = WorkLog.read(folder / "finished.log") if folder.is_dir() else None
+    return log is not None and log.key == f"{key} {__version__}"
+
+
+def _run(
+    case: CaseRun, folder: Path, log: Any, progress: Progress | None
+) -> tuple[list[IndexRow], list[Check]]:
+    """Run a case, or take what is finished; return its rows and its checks."""
+    record = case.record
+    if case.absent:
+        return rows_without(record, NOT_RUN, case.absent), []
+    item: Item | None = log.intact(record.name)
+    if item is None:
+        place = folder / record.name
+        try:
+            values = case.work(place, progress)
+        except Interrupted:
+            raise
+        except ElevonError as error:
+            return rows_without(record, FAIL, str(error)), []
+        files = [path for path in (place / "report.html", place / "rows.csv") if path.is_file()]
+        item = log.note(record.name, files, checks=finite(values["checks"]))
+    checks = [_check(entry) for entry in item.data["checks"]]
+    page = f"{record.name}/report.html"
+    link = page if page in item.files else ""
+    named = [Check(f"{record.name}: {c.name}", c.value, c.limit, c.unit, c.at_least, c.ours)
+             for c in checks]  # fmt: skip
+    return rows_of(record, checks, link), named
+
+
+def _check(entry: Mapping[str, Any]) -> Check:
+    """Return a check as it was kept; a value that was not finite is null there."""
+    fields = {name: entry[name] for name in ("name", "limit", "unit", "at_least")}
+    value = entry["value"]
+    return Check(value=float("nan") if value is None else value, ours=entry.get("ours"), **fields)
+
+
+def rows_of(record: Published, checks: Sequence[Check], link: str = "") -> list[IndexRow]:
+    """Return the rows of a case that ran: its checks, and what it was to check and did not."""
+    rows = []
+    for check in checks:
+        judged = next((item for item in record.checks if item.judges(check.name)), None)
+        rows.append(_row(record, check, judged or Judgement(check.name, " ", "", ""), link))
+    for judged in record.checks:
+        if not any(judged.judges(check.name) for check in checks):
+            rows.append(_without(record, judged, NOT_RUN, "the case made no such check", link))
+    return rows
+
+
+def rows_without(record: Published, verdict: str, reason: str) -> list[IndexRow]:
+    """Return the rows of a case that has no result."""
+    return [_without(record, judged, verdict, reason, "") for judged in record.checks]
+
+
+def _row(record: Published, check: Check, judged: Judgement, link: str) -> IndexRow:
+    paper, _, item = judged.item.partition(" ")
+    sign, unit = (">=" if check.at_least else "<="), f" {check.unit}".rstrip()
+    beyond = "below" if check.at_least else "above"
+    why = f"{check.value:.5g}{unit} is {beyond} {check.limit:.5g}{unit}"
+    reason = "" if check.passed else f"{why}: {judged.known}" if judged.known else why
+    return IndexRow(
+        paper=paper,
+        item=item,
+        case=record.name,
+        check=check.name,
+        ours=check.value if check.ours is None else check.ours,
+        theirs=judged.theirs,
+        limit=f"{sign} {check.limit:.5g}{unit}",
+        verdict=PASS if check.passed else FAIL,
+        reason=reason,
+        definition=judged.definition,
+        link=link,
+    )
+
+
+def _without(
+    record: Published, judged: Judgement, verdict: str, reason: str, link: str
+) -> IndexRow:
+    paper, _, item = judged.item.partition(" ")
+    return IndexRow(paper, item, record.name, judged.check, None, judged.theirs, "", verdict,
+                    reason, judged.definition, link)  # fmt: skip
