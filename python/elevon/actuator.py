@@ -10,6 +10,7 @@ from typing import Any
 
 from elevon.parameters import Parameter, ParameterSet, load_set, set_names
 from elevon.plain import Plain
+from elevon.seam import ValueFinding
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ class Actuator(Plain):
         """Sixteen hexadecimal digits over the wiring and every value."""
         return self.parameters.hash
 
-    def findings(self, fidelity: str = "high") -> list[dict[str, Any]]:
+    def findings(self, fidelity: str = "high") -> list[ValueFinding]:
         """Return what the core says against these values together (empty when nothing).
 
         Each finding has ``severity``, ``path``, ``value``, ``limit`` and ``message``: a step too
@@ -135,7 +136,7 @@ class Actuator(Plain):
         """
         from elevon import _core
 
-        return list(_core.check(self.wiring, fidelity, self.parameters.vector()))
+        return _core.check(self.wiring, fidelity, self.parameters.vector())
 
 
 def list_actuators() -> list[str]:

@@ -128,7 +128,7 @@ def _depth(data: Any) -> int:
     return depth
 
 
-def validated(model: type[Model], data: Mapping[str, Any], document: Document) -> Model:
+def validated(model: type[Model], data: Mapping[str, object], document: Document) -> Model:
     """Build a pydantic model, or raise one `InputError` that lists every finding with its place."""
     from pydantic import ValidationError
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -76,7 +75,7 @@ class ActuatorEnv(gymnasium.Env[Floats, Floats]):
         self.session.restore(self._start)
         return self._seen(), {}
 
-    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, object]]:
         """Act for one period; an episode is terminated where the drive trips or diverges."""
         share = np.clip(np.asarray(action, dtype=np.float64).reshape(1), -1.0, 1.0)
         self.session.set(command=float(share[0]) * self._limit)

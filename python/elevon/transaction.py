@@ -65,7 +65,7 @@ class Transaction:
         settle(self.folder, self.files)
 
 
-def located(folder: Path, name: str, about: Mapping[str, Any] | None) -> Path:
+def located(folder: Path, name: str, about: Mapping[str, object] | None) -> Path:
     """Return where the file of a name and SHA-256 is: waiting beside, or under its own name."""
     if about is not None:
         waiting = _staged(folder, name, about)

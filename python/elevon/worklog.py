@@ -120,7 +120,7 @@ class WorkLog:
         log.cut = None in lines or not text.endswith(b"\n")
         return log
 
-    def note(self, name: str, files: Iterable[Path], **data: Any) -> Item:
+    def note(self, name: str, files: Iterable[Path], **data: object) -> Item:
         """Write down, durably, that an item is finished.
 
         Parameters

@@ -11,6 +11,7 @@ from tests.contract.source import PACKAGE
 # thought: what it may know of is everything left of it, and nothing else.
 ROWS = [
     ["retired", "arrays", "_core"],
+    ["seam"],
     ["errors", "extras"],
     ["units", "files", "progress", "memory", "data", "threads", "plain"],
     ["documents", "series", "number_text", "report", "worklog", "containers", "estimate"],

@@ -59,7 +59,8 @@ def _signals(wiring: str, fidelity: str) -> dict[str, str]:
     """Role to the model's signal, the last of a role."""
     from elevon.scenario.compile import signal_records
 
-    return {item["role"]: name for name, item in signal_records(wiring, fidelity).items()}
+    records = signal_records(wiring, fidelity)
+    return {item["role"]: name for name, item in records.items() if item["role"] is not None}
 
 
 def _actions(log: Log, wiring: str) -> tuple[tuple[float, str], ...]:

@@ -96,8 +96,9 @@ def turns(actuator: Actuator) -> bool:
     from elevon.parameters.records import wirings
     from elevon.scenario.compile import signal_records
 
-    position = signal_records(actuator.wiring, "high").get("output_position", {})
-    return "position" in wirings()[actuator.wiring]["modes"] and position.get("unit") == "rad"
+    position = signal_records(actuator.wiring, "high").get("output_position")
+    moved = position is not None and position["unit"] == "rad"
+    return moved and "position" in wirings()[actuator.wiring]["modes"]
 
 
 @dataclass(frozen=True)

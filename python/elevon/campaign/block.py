@@ -19,6 +19,7 @@ from elevon.errors import InputError, OutputError
 from elevon.files import atomic_path, check_owned
 from elevon.record_plan import ClockPlan
 from elevon.scenario.compile import signal_records
+from elevon.seam import CoreResult, CoreRows
 from elevon.simulate.batch import simulate_prepared
 from elevon.simulate.prepare import Prepared
 from elevon.worklog import Item, digest
@@ -26,7 +27,6 @@ from elevon.worklog import Item, digest
 if TYPE_CHECKING:
     import pyarrow as pa
 
-Result = Mapping[str, Any]
 
 #: Rows of a row group: reading one run reads no more than some of these.
 _GROUP = 32_768
@@ -78,7 +78,7 @@ def finish_block(
     numbers: Sequence[int],
     *,
     prepared: Sequence[Prepared],
-    results: Sequence[Result],
+    results: Sequence[CoreResult],
 ) -> Item:
     """Write what a block's runs gave; arguments and errors as `run_block`."""
     tables = block_tables(resolved, numbers, prepared, results)
@@ -90,7 +90,7 @@ def block_tables(
     resolved: Resolved,
     numbers: Sequence[int],
     prepared: Sequence[Prepared],
-    results: Sequence[Result],
+    results: Sequence[CoreResult],
 ) -> dict[str, pa.Table]:
     """Return a block's tables by folder: ``runs/CLOCK`` of each clock, ``features``, ``ends``."""
     clocks = {clock.name: clock for item in prepared for clock in item.plan}
@@ -105,7 +105,7 @@ def block_tables(
     return tables
 
 
-def block_outcome(results: Sequence[Result]) -> dict[str, Any]:
+def block_outcome(results: Sequence[CoreResult]) -> dict[str, Sequence[object]]:
     """Return how each run of a block ended, in JSON's types."""
     return {
         "status": [str(result["status"]) for result in results],
@@ -120,7 +120,7 @@ def write_block(
     index: int,
     numbers: Sequence[int],
     tables: Mapping[str, pa.Table],
-    outcome: Mapping[str, object],
+    outcome: Mapping[str, Sequence[object]],
     *,
     mark: str,
 ) -> Item:
@@ -178,7 +178,7 @@ def simulate_block(
     prepared: Sequence[Prepared],
     threads: int | None,
     progress: Callable[[float], object] | None,
-) -> list[dict[str, object]]:
+) -> list[CoreResult]:
     """Simulate a block; a run that the core refuses after all is set apart, with its reason."""
     options = {"fidelity": resolved.fidelity, "threads": threads}
     try:
@@ -193,13 +193,16 @@ def simulate_block(
         return results
 
 
-def _refused(prepared: Prepared, reason: str) -> dict[str, Any]:
+def _refused(prepared: Prepared, reason: str) -> CoreResult:
     columns = len(prepared.core["faults"])
-    clocks = {
+    clocks: dict[str, CoreRows] = {
         clock.name: {"time": np.empty(0), "values": np.empty((0, len(clock.signals) + columns))}
         for clock in prepared.plan
     }
-    return {"status": "refused", "message": reason, "time": 0.0, "steps": 0, "clocks": clocks}
+    return {
+        "status": "refused", "message": reason, "time": 0.0, "steps": 0, "wall_s": 0.0,
+        "clocks": clocks, "features": {}, "final": {},
+    }  # fmt: skip
 
 
 def _signals(
@@ -207,7 +210,7 @@ def _signals(
     clock: ClockPlan,
     numbers: Sequence[int],
     prepared: Sequence[Prepared],
-    results: Sequence[Result],
+    results: Sequence[CoreResult],
 ) -> pa.Table:
     """Return one clock's samples: run, time, the channels, and the severity of every fault."""
     import pyarrow as pa

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,13 @@ import numpy.typing as npt
 from elevon.campaign.dataset import Dataset
 from elevon.errors import InputError
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 _BINS = 20
 
 
-def describe(ds: Dataset) -> dict[str, Any]:
+def describe(ds: Dataset) -> dict[str, object]:
     """Return counts, distributions and columns of a data set, in JSON's types.
 
     Returns
@@ -73,7 +76,7 @@ def counted(items: Sequence[str]) -> dict[str, int]:
     return counts
 
 
-def distribution(column: Any) -> dict[str, Any]:
+def distribution(column: pa.ChunkedArray) -> dict[str, object]:
     """Return smallest, largest, mean, quartiles and histogram of a column; counts of texts."""
     if not str(column.type).startswith(("double", "int")):
         return {"counts": counted([str(value) for value in column.to_pylist()])}

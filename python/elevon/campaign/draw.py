@@ -170,7 +170,7 @@ def ranged(
 
 
 def read_values(
-    target: Target, given: Sequence[Any], wiring: str, place: str
+    target: Target, given: Sequence[float | str], wiring: str, place: str
 ) -> tuple[str, Values]:
     """Return unit and values of a list; choices, modes and the like stay texts.
 

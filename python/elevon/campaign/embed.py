@@ -68,7 +68,7 @@ class Embedder:
         self.sources[str(path)] = hashlib.sha256(read_regular(path, LONGEST)).hexdigest()
         return {"times": list(times), "values": list(values)}
 
-    def scenario(self, data: Mapping[str, Any], place: str) -> dict[str, Any]:
+    def scenario(self, data: Mapping[str, object], place: str) -> dict[str, object]:
         """Return a scenario's mappings with the points of every file in them."""
         return {
             key: [self.fault(item, f"{place}.fault[{k}]") for k, item in enumerate(value)]

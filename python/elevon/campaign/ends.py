@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.scenario.compile import signal_records
+from elevon.seam import CoreResult
 from elevon.simulate.prepare import Prepared
 from elevon.simulate.result import final_values
 from elevon.worklog import Item
@@ -36,15 +37,15 @@ def ends_table(
     resolved: Resolved,
     numbers: Sequence[int],
     prepared: Sequence[Prepared],
-    results: Sequence[Mapping[str, Any]],
-    outcome: Mapping[str, Sequence[Any]],
+    results: Sequence[CoreResult],
+    outcome: Mapping[str, Sequence[object]],
 ) -> pa.Table:
     """Return how a block's runs ended; NaN where a run was refused."""
     import pyarrow as pa
 
     known = signal_records(resolved.wiring, resolved.fidelity)
     rows = [
-        final_values(result.get("final", {}), {name for plan in item.plan for name in plan.signals})
+        final_values(result["final"], {name for plan in item.plan for name in plan.signals})
         for item, result in zip(prepared, results, strict=True)
     ]
     names = dict.fromkeys(name for row in rows for name in row)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.features import feature_records
+from elevon.seam import CoreResult
 from elevon.simulate.prepare import Prepared
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def feature_table(
     resolved: Resolved,
     numbers: Sequence[int],
     prepared: Sequence[Prepared],
-    results: Sequence[Mapping[str, Any]],
+    results: Sequence[CoreResult],
 ) -> pa.Table:
     """Return a block's features; NaN where a run gives none, or was refused."""
     import pyarrow as pa
@@ -45,7 +46,7 @@ def feature_table(
     schema = feature_schema(resolved, prepared[0])
     values = np.full((len(numbers), len(schema) - 1), np.nan)
     for row, (item, result) in enumerate(zip(prepared, results, strict=True)):
-        if "features" in result:
+        if result["features"]:
             values[row] = np.concatenate([result["features"][p.name] for p in item.features])
     columns = [pa.array(np.asarray(numbers, dtype=np.int64))]
     columns += [pa.array(np.ascontiguousarray(column)) for column in values.T]

@@ -155,7 +155,7 @@ def _parts(split: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} = {share:g}" for name, share in shares.items()) or "none"
 
 
-def finished(work: CampaignWork) -> dict[str, list[Any]] | None:
+def finished(work: CampaignWork) -> dict[str, list[object]] | None:
     """Return how every run ended where the campaign is finished; a log left beside it goes."""
     files = Item("tables", work.manifest.files, {})
     if work.manifest.status == "running" or work.missing or not files.intact(work.folder):
@@ -166,7 +166,7 @@ def finished(work: CampaignWork) -> dict[str, list[Any]] | None:
     return read_outcome(work.folder / RUNS)
 
 
-def finish(work: CampaignWork, plan: str | None = None) -> dict[str, list[Any]]:
+def finish(work: CampaignWork, plan: str | None = None) -> dict[str, list[object]]:
     """Write the table of the runs, the cards and the manifest; return how every run ended.
 
     Parameters

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from elevon.campaign.ends import last_values
 from elevon.campaign.resolved import Resolved
 from elevon.errors import InputError
 from elevon.recording import Channel, Clock, Recording
-from elevon.simulate.result import fault_labels
+from elevon.simulate.result import FaultLabel, fault_labels
 
 if TYPE_CHECKING:
     from elevon.campaign.dataset import Dataset
@@ -39,7 +40,7 @@ def recorded(ds: Dataset, number: int) -> Recording:
     return Recording(channels, clocks=clocks, meta=meta, labels=labels, final=final)
 
 
-def _severities(labels: list[dict[str, Any]], frame: Any, clock: Clock) -> list[Channel]:
+def _severities(labels: Sequence[FaultLabel], frame: Any, clock: Clock) -> list[Channel]:
     channels = []
     for label in labels:
         name = f"{label['kind']}@{label['place']}"

@@ -112,7 +112,7 @@ class Resolved:
         """Of the actuator."""
         return self.actuator.wiring
 
-    def values(self, number: int) -> dict[str, Any]:
+    def values(self, number: int) -> dict[str, object]:
         """Return the varied quantities of one run: SI numbers, 0 for a fault it is spared."""
         return {c.name: _plain(c.values[number]) for c in self.columns}
 
@@ -254,7 +254,7 @@ def _plain(value: Any) -> Any:
 _STEP = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)|\[(\d+)\]")
 
 
-def set_place(data: Any, path: str, value: Any, place: str) -> None:
+def set_place(data: Any, path: str, value: object, place: str) -> None:
     """Set one place of nested mappings and lists; the place must be one the scenario has."""
     steps: list[Any] = [m[1] if m[1] else int(m[2]) for m in _STEP.finditer(path)]
     written = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in steps).lstrip(".")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 RUNS = "runs.parquet"
 
 
-def runs_table(resolved: Resolved, outcome: Mapping[str, Sequence[Any]]) -> pa.Table:
+def runs_table(resolved: Resolved, outcome: Mapping[str, Sequence[object]]) -> pa.Table:
     """Return the table of the runs, one row each.
 
     Parameters
@@ -61,7 +61,7 @@ def runs_table(resolved: Resolved, outcome: Mapping[str, Sequence[Any]]) -> pa.T
     return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
-def _texts(values: Sequence[str]) -> Any:
+def _texts(values: Sequence[object]) -> Any:
     return np.array(values, dtype=object)
 
 
@@ -100,7 +100,7 @@ def with_copy(table: pa.Table, plan: str, resolved: str, mark: str) -> pa.Table:
     return table.replace_schema_metadata({"elevon": about})
 
 
-def planned(count: int) -> dict[str, list[Any]]:
+def planned(count: int) -> dict[str, list[object]]:
     """Return the outcome of runs that are not done."""
     return {
         "status": ["planned"] * count,
@@ -110,13 +110,13 @@ def planned(count: int) -> dict[str, list[Any]]:
     }
 
 
-def read_outcome(path: Path) -> dict[str, list[Any]]:
+def read_outcome(path: Path) -> dict[str, list[object]]:
     """Return how every run of a finished campaign ended, from its table."""
     table = read_table(path)
     return {key: table[key].to_pylist() for key in planned(0)}
 
 
-def read_table(path: Path) -> Any:
+def read_table(path: Path) -> pa.Table:
     """Read a Parquet file whose pages are compared with their checksums."""
     import pyarrow.parquet as pq
 

@@ -13,7 +13,7 @@ _LARGEST = 256 * 2**20
 """Bytes that a packed text may expand to."""
 
 
-def seal(content: Mapping[str, Any]) -> str:
+def seal(content: Mapping[str, object]) -> str:
     """Return the SHA-256 of JSON content, whatever the order of its keys."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

@@ -17,7 +17,7 @@ Groups = npt.NDArray[np.int64]
 
 def dealt(
     groups: Groups, shares: Mapping[str, float], seed: int, place: str, noun: str
-) -> npt.NDArray[Any]:
+) -> npt.NDArray[np.object_]:
     """Return the part of each run.
 
     Parameters

@@ -280,7 +280,7 @@ def _own_features(reference: str, fidelity: str) -> list[dict[str, Any]]:
     check_fidelity(wiring, fidelity)
     units = {name: unit or "1" for name, unit in signal_units(wiring, fidelity).items()}
     records = signal_records(wiring, fidelity)
-    stated = {item["role"]: name for name, item in records.items() if item.get("role")}
+    stated = {item["role"]: name for name, item in records.items() if item["role"]}
     roles = comparable(assign_roles(units, stated=stated), units)
     by_role = {role: units[name] for role, name in roles.items()}
     return [

@@ -66,7 +66,7 @@ class RunDocument:
     signals: tuple[str, ...]
     step: float
 
-    def contents(self, announced: Iterable[str] = ()) -> dict[str, Any]:
+    def contents(self, announced: Iterable[str] = ()) -> dict[str, object]:
         """Return what is written; `announced` faults (``KIND@PLACE``) are held from the start."""
         names = [f"{port.record.kind}@{port.place}" for port in self.faults]
         wanted = list(announced)
@@ -154,7 +154,7 @@ def run_document(
     )
 
 
-def as_text(contents: Mapping[str, Any]) -> str:
+def as_text(contents: Mapping[str, object]) -> str:
     """Return JSON in ASCII without escapes that the binary does not read.
 
     Raises
@@ -169,7 +169,7 @@ def as_text(contents: Mapping[str, Any]) -> str:
     return text
 
 
-def token_of(contents: Mapping[str, Any]) -> str:
+def token_of(contents: Mapping[str, object]) -> str:
     """Return the digest by which an importer and the binary know that they mean the same."""
     return hashlib.sha256(as_text(contents).encode()).hexdigest()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from elevon.deploy.document import RunDocument
 from elevon.parameters import records
@@ -77,7 +76,7 @@ def fmu_variables(document: RunDocument) -> list[FmuVariable]:
     ]  # fmt: skip
 
 
-def rows(variables: list[FmuVariable]) -> list[list[Any]]:
+def rows(variables: list[FmuVariable]) -> list[list[object]]:
     """Return what the binary is told of them: name, kind, places, form."""
     return [[item.name, *item.row, item.form] for item in variables]
 

@@ -11,6 +11,7 @@ from elevon.errors import InputError
 from elevon.faults.catalogue import find_record
 from elevon.faults.grammar import pairs
 from elevon.faults.profile import Profile
+from elevon.seam import CoreFault
 
 Value = float | str
 
@@ -94,7 +95,7 @@ class Fault:
         )
         return cls(attributes=keys, profile=read, **needed)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the mapping `from_dict` reads."""
         data = {"kind": self.kind, "place": self.place, "severity": self.severity}
         profile = {} if self.profile == Profile() else {"profile": self.profile.to_dict()}
@@ -106,7 +107,7 @@ class Fault:
         profile = "" if self.profile == Profile() else f":{self.profile}"
         return f"{self.kind}@{self.place}={self.severity}{attributes}{profile}"
 
-    def resolved(self, wiring: str, fidelity: str, place: str = "") -> dict[str, Any]:
+    def resolved(self, wiring: str, fidelity: str, place: str = "") -> CoreFault:
         """Check the fault against the catalogue and return what crosses the seam, in SI.
 
         Raises

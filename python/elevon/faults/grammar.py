@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
 
 from elevon.errors import InputError
 
@@ -20,9 +20,11 @@ def pairs(text: str, place: str) -> dict[str, str]:
     return values
 
 
-def numbers(given: Any, place: str) -> tuple[float, ...]:
+def numbers(given: object, place: str) -> tuple[float, ...]:
     """Read a sequence of numbers, or a text of numbers separated by semicolons."""
-    items = [part.strip() for part in given.split(";")] if isinstance(given, str) else list(given)
+    items = [part.strip() for part in given.split(";")] if isinstance(given, str) else given
+    if not isinstance(items, Iterable):
+        raise InputError(f"{place}: {given!r} is not a list of numbers")
     try:
         return tuple(float(item) for item in items)
     except (TypeError, ValueError) as error:

@@ -10,6 +10,7 @@ from typing import Any
 
 from elevon.errors import InputError, unknown
 from elevon.faults.grammar import numbers, pairs
+from elevon.seam import CoreProfile, Points, ProfileParameter, ProfileRecord
 from elevon.series import check_series, read_series
 from elevon.units import parse_quantity
 
@@ -58,7 +59,7 @@ class Profile:
         values = numbers(keys.pop("values", ()), f"{place}: values")
         return cls(kind, keys, times, values)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the mapping `from_dict` reads."""
         points = {"times": list(self.times), "values": list(self.values)} if self.times else {}
         return {"kind": self.kind, **self.arguments, **points}
@@ -75,7 +76,7 @@ class Profile:
         )
         return f"{self.kind}({given})" if given else self.kind
 
-    def resolved(self, place: str) -> dict[str, Any]:
+    def resolved(self, place: str) -> CoreProfile:
         """Check the profile against the core's records; return what crosses the seam, in SI.
 
         Raises
@@ -91,11 +92,17 @@ class Profile:
         at = f"{place}: profile {self.kind}"
         values = _values(self.arguments, known[self.kind]["parameters"], at)
         _check(values, at)
-        return {"kind": self.kind, "parameters": list(values.values()), **_points(self, at)}
+        times, points = _points(self, at)
+        return {
+            "kind": self.kind,
+            "parameters": list(values.values()),
+            "times": times,
+            "values": points,
+        }
 
 
 @lru_cache(maxsize=1)
-def profile_records() -> Mapping[str, Mapping[str, Any]]:
+def profile_records() -> Mapping[str, ProfileRecord]:
     """Return the core's records of fault profiles, by kind."""
     from elevon import _core
 
@@ -103,7 +110,7 @@ def profile_records() -> Mapping[str, Mapping[str, Any]]:
 
 
 def _values(
-    arguments: Mapping[str, float | str], parameters: list[Mapping[str, Any]], at: str
+    arguments: Mapping[str, float | str], parameters: list[ProfileParameter], at: str
 ) -> dict[str, float]:
     for name in arguments:
         if name not in {item["name"] for item in parameters}:
@@ -132,12 +139,12 @@ def _check(values: Mapping[str, float], at: str) -> None:
         raise InputError(f"{at}: duty = {values['duty']:g} must be from 0 to 1")
 
 
-def _points(profile: Profile, at: str) -> dict[str, Any]:
+def _points(profile: Profile, at: str) -> tuple[Points, Points]:
     if profile.kind != "table":
         if profile.times or profile.values:
             raise InputError(f"{at}: only a table takes times and values")
-        return {"times": (), "values": ()}
+        return (), ()
     times, values = check_series(profile.times, profile.values, at)
     if values.min() < 0.0 or values.max() > 1.0:
         raise InputError(f"{at}: the values are fractions of the severity, from 0 to 1")
-    return {"times": times, "values": values}
+    return times, values

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from elevon.errors import InputError
 from elevon.features.records import feature_records, wanted_records
 from elevon.features.roles import assign_roles, comparable
 from elevon.record_plan import period_of
 from elevon.scenario.compile import signal_records, signal_units
+from elevon.seam import CoreResult
 
 #: Motor speed in rad/s above which the motor counts as moving, where nothing else is given.
 MOVING_SPEED = 1.0
@@ -59,7 +60,7 @@ class FeaturePlan:
             ),
         }
 
-    def values(self, result: Mapping[str, Any]) -> dict[str, float]:
+    def values(self, result: CoreResult) -> dict[str, float]:
         """Return the features in one result of the core; NaN where the motion gives none."""
         return dict(zip(self.names, result["features"][self.name].tolist(), strict=True))
 
@@ -138,7 +139,7 @@ class _Model(NamedTuple):
 
     def roles(self) -> dict[str, str]:
         known = signal_records(self.wiring, self.fidelity)
-        return {item["role"]: name for name, item in known.items() if item.get("role")}
+        return {item["role"]: name for name, item in known.items() if item["role"]}
 
 
 @lru_cache(maxsize=64)

@@ -48,15 +48,15 @@ class Exhibit(Protocol):
     loop: LiveLoop
     files: list[Path]
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, object]:
         """Return what does not change."""
         ...
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, object]:
         """Return how it stands."""
         ...
 
-    def act(self, message: Mapping[str, Any]) -> dict[str, Any]:
+    def act(self, message: Mapping[str, object]) -> dict[str, object]:
         """Do what a message says."""
         ...
 

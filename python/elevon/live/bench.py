@@ -91,11 +91,11 @@ class LiveBench:
         self.watch.stop()
         self.loop.stop()
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, object]:
         """Return what a page must know of the actuator."""
         return description(self.unit)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, object]:
         """Return time, factor, values, health, and how the bench stands."""
         unit, recorder = self.unit, self.recorder
         self.panel.refresh(unit)
@@ -118,7 +118,7 @@ class LiveBench:
             "injected": None if self.hide_truth else self._injected(),
         }
 
-    def act(self, message: Mapping[str, Any]) -> dict[str, Any]:
+    def act(self, message: Mapping[str, object]) -> dict[str, object]:
         """Do what a message says, between two samples; return what came of it.
 
         Parameters

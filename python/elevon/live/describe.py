@@ -42,7 +42,7 @@ _GEOMETRY = (
 )  # fmt: skip
 
 
-def unit_text(unit: str) -> dict[str, Any]:
+def unit_text(unit: str) -> dict[str, object]:
     """Return the unit in which a person reads a quantity, and how SI becomes it."""
     display = "degC" if unit == "K" else shown_unit(unit)
     if unit == "K":
@@ -52,7 +52,7 @@ def unit_text(unit: str) -> dict[str, Any]:
     return {"unit": unit, "shown": text, "given": display, "scale": scale, "offset": 0.0}
 
 
-def description(unit: LiveUnit) -> dict[str, Any]:
+def description(unit: LiveUnit) -> dict[str, object]:
     """Return what a page must know of a live unit, in plain types."""
     actuator = unit.actuator
     wiring = wirings()[actuator.wiring]

@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 from urllib.parse import urlsplit
 
 from elevon.documents import check_depth
@@ -62,7 +61,7 @@ class Guard:
         return None
 
 
-def message_of(text: str | bytes) -> dict[str, Any]:
+def message_of(text: str | bytes) -> dict[str, object]:
     """Read one JSON object.
 
     Raises

@@ -46,7 +46,7 @@ class WatchTable:
         if self._home_at is not None and unit.time >= self._home_at:
             self.homed, self._home_at = True, None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the switches for whoever shows them."""
         return {
             "enabled": self.enabled,
@@ -56,14 +56,14 @@ class WatchTable:
             "block": dict(self.block),
         }
 
-    def run(self, unit: LiveUnit, command: Mapping[str, Any]) -> None:
+    def run(self, unit: LiveUnit, command: Mapping[str, object]) -> None:
         """Run a command at once, the switches as an operator would have set them."""
         unit.command(command)
         self.block = dict(command)
         self.enabled = self.homed = self.moving = True
         self._home_at = None
 
-    def submit(self, unit: LiveUnit, command: Mapping[str, Any]) -> None:
+    def submit(self, unit: LiveUnit, command: Mapping[str, object]) -> None:
         """Keep a command for `move`; one that runs already is replaced."""
         unit.check_command(command)
         self.block = dict(command)

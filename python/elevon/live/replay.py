@@ -113,7 +113,7 @@ class LogReplay:
         """End."""
         self.loop.stop()
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, object]:
         """Return what a page must know of the log."""
         drawn = {name for _, names in PLOTS for name in names}
         present = [name for name in self.source.names if name in drawn]
@@ -144,7 +144,7 @@ class LogReplay:
             "waveforms": [],
         }
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> dict[str, object]:
         """Return time, factor, values and the verdict on the log."""
         source = self.source
         status, message = source.status
@@ -165,7 +165,7 @@ class LogReplay:
             "injected": None,
         }
 
-    def act(self, message: Mapping[str, Any]) -> dict[str, Any]:
+    def act(self, message: Mapping[str, object]) -> dict[str, object]:
         """Pause, go on, begin again, change the factor.
 
         Raises

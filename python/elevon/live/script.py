@@ -32,7 +32,7 @@ class Script:
     _begun: float | None = None
 
     @classmethod
-    def read(cls, given: Any, known: Sequence[str]) -> Script:
+    def read(cls, given: object, known: Sequence[str]) -> Script:
         """Read steps, times rising.
 
         Raises
@@ -56,7 +56,7 @@ class Script:
             script.steps.append((float(time), acts))
         return script
 
-    def due(self, now: float, act: Callable[[Mapping[str, Any]], Any]) -> None:
+    def due(self, now: float, act: Callable[[Mapping[str, object]], object]) -> None:
         """Do the steps whose instant has come; the first call is the start."""
         self._begun = now if self._begun is None else self._begun
         while self.steps and self.steps[0][0] <= now - self._begun + _SLACK:
@@ -66,6 +66,6 @@ class Script:
                 self.error = str(error)
                 self.steps.clear()
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return how it stands."""
         return {"left": len(self.steps), "error": self.error}

@@ -133,7 +133,7 @@ class LiveUnit:
         """Return the signals as they stand."""
         return list(self._session.read(*self.names).values())
 
-    def command(self, given: Mapping[str, Any]) -> None:
+    def command(self, given: Mapping[str, object]) -> None:
         """Set the command, as in a scenario file, in time from now on.
 
         Raises
@@ -151,7 +151,7 @@ class LiveUnit:
         self.given = {"mode": read.mode, **given}
         self.given_at = self.time
 
-    def check_command(self, given: Mapping[str, Any]) -> Command:
+    def check_command(self, given: Mapping[str, object]) -> Command:
         """Return a command that the bench takes; raises as `command`, and changes nothing."""
         read = validated(Command, {"mode": self.mode, **given}, Document("command", "", {}))
         modes = wirings()[self.actuator.wiring]["modes"]
@@ -178,7 +178,7 @@ class LiveUnit:
         ramp = {"kind": "ramp", "initial": start, "slope": -start / seconds, "end": seconds}
         self.command({"mode": self.mode, "terms": [ramp]})
 
-    def set(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: object) -> None:
         """Set an input (a number, a text with a unit, a waveform) or a parameter by its path.
 
         Raises
@@ -201,7 +201,7 @@ class LiveUnit:
         else:
             raise unknown("input", name, [*ranges, *self.actuator.parameters], "set")
 
-    def inject(self, name: str, given: Any) -> None:
+    def inject(self, name: str, given: object) -> None:
         """Set the severity of a fault, ``KIND@PLACE``; zero clears it.
 
         Parameters

@@ -52,7 +52,7 @@ class LoadTable:
         """Return the position as one entry of ``command.terms``."""
         return _term(self.time, self.position, "m" if self.linear else "rad", repeat)
 
-    def scenario(self) -> dict[str, Any]:
+    def scenario(self) -> dict[str, object]:
         """Return a scenario that flies the flight: command, load and duration, in SI units."""
         return {
             "duration": float(self.time[-1]),

@@ -61,7 +61,7 @@ class ImportReport:
         """Whether a finding of this code was made."""
         return any(finding.code == code for finding in self.findings)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the report as plain types."""
         return {
             "source": self.source,

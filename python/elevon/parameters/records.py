@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from elevon.errors import InputError, RangeError, UnknownNameError, did_you_mean, unknown
+from elevon.seam import WiringRecord
 from elevon.units import format_quantity, parse_quantity
 
 
@@ -118,7 +119,7 @@ class Record:
 
 
 @lru_cache(maxsize=1)
-def wirings() -> Mapping[str, Mapping[str, Any]]:
+def wirings() -> Mapping[str, WiringRecord]:
     """Return the core's wirings, by name."""
     from elevon import _core
 

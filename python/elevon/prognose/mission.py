@@ -184,7 +184,7 @@ class Mission(_Frozen):
         return mission
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], place: str = "mission") -> Mission:
+    def from_dict(cls, data: Mapping[str, object], place: str = "mission") -> Mission:
         """Build a mission from nested mappings of the file's form; errors as `load`."""
         document = Document(place, "", {})
         mission = validated(cls, data, document)

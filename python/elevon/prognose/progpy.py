@@ -7,7 +7,7 @@ filters and predictors add noise of their own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -95,7 +95,9 @@ def to_samples(units: UnitPopulation, process: Process) -> object:
     return UnweightedSamples([_states(units, n, process.laws) for n in range(len(units))])
 
 
-def from_samples(samples: Any, process: Process, *, usage: float = 0.0) -> UnitPopulation:
+def from_samples(
+    samples: Iterable[Mapping[str, float]], process: Process, *, usage: float = 0.0
+) -> UnitPopulation:
     """Return ProgPy's samples of states as units; the inverse of `to_samples`.
 
     Raises

@@ -66,8 +66,8 @@ class Recording(ChannelSet):
         channels: Iterable[Channel],
         *,
         clocks: Iterable[Clock] = (),
-        meta: Mapping[str, Any] | None = None,
-        labels: Sequence[Any] | Mapping[str, Any] | None = None,
+        meta: Mapping[str, object] | None = None,
+        labels: Sequence[object] | Mapping[str, object] | None = None,
         final: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(channels, clocks)
@@ -198,7 +198,7 @@ class Recording(ChannelSet):
             final={**self.final, **other.final},
         )
 
-    def with_meta(self, **entries: Any) -> "Recording":
+    def with_meta(self, **entries: object) -> "Recording":
         """Return the same recording with entries of `meta` added or replaced."""
         same = self._with(self.channels, self.clocks.values())
         same.meta = plain({**self.meta, **entries}, "meta")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -36,7 +35,7 @@ class FunctionalRow:
         required = self.condition.requirement
         return None if required is None else bool(self.cycle_s < required)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return one row of the command's JSON object."""
         return {
             "condition": self.condition.name,
@@ -60,7 +59,7 @@ class FunctionalResult:
     fidelity: str
     checks: list[Check]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command; the limit condition has no requirement."""
         runs = [run for row in self.rows for run in (row.extension, row.retraction)]
         return {

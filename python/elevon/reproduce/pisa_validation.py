@@ -61,7 +61,7 @@ class ValidationResult:
             if row["signal"] == "output_position"
         ]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command."""
         return {
             **verdict(self.checks),

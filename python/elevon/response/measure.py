@@ -177,7 +177,7 @@ class Multisine:
         self._multiples = multiples
         self._shape = 1.0 / multiples if falling else np.ones(len(multiples))
 
-    def terms(self, amplitude: float, generator: np.random.Generator) -> list[dict[str, Any]]:
+    def terms(self, amplitude: float, generator: np.random.Generator) -> list[dict[str, object]]:
         """Return the waveforms of one realisation."""
         phases = generator.uniform(0.0, 2.0 * np.pi, self.frequency.size)
         time = np.linspace(0.0, self.period, 64 * int(self._multiples[-1]), endpoint=False)

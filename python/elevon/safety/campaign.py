@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
@@ -48,7 +48,7 @@ class HazardRow:
     fidelity: str
     reason: str
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the row of the JSON object."""
         return {
             "hazard": self.hazard,

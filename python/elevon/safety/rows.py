@@ -64,7 +64,7 @@ class Failure:
         profile = (("kind", kind), *sorted(parameters.items()))
         return Failure(self.kind, self.place, self.severity, profile, self.attributes)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the fault as a scenario has it."""
         return {
             "kind": self.kind,

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+
+import numpy as np
 
 from elevon.errors import InputError, unknown
 from elevon.faults import check_together
 from elevon.parameters.records import wirings
 from elevon.scenario.scenario import Action, Scenario, Term, Terms
+from elevon.seam import CoreFault, CoreTerm, Points, SignalRecord
 from elevon.units import check_kind, parse_quantity, to_si
 from elevon.waveforms import TABLE, check_repeated, check_values, unit_of, wave_records
 
@@ -33,16 +35,16 @@ class CompiledScenario:
         s.
     """
 
-    inputs: Mapping[str, list[dict[str, Any]]]
+    inputs: Mapping[str, list[CoreTerm]]
     command_mode: str
     command_unit: str
-    faults: list[dict[str, Any]]
+    faults: list[CoreFault]
     initial: Mapping[str, float]
     duration: float
 
 
 @lru_cache(maxsize=32)
-def signal_records(wiring: str, fidelity: str) -> Mapping[str, Mapping[str, Any]]:
+def signal_records(wiring: str, fidelity: str) -> Mapping[str, SignalRecord]:
     """Return the core's records of every recordable signal, by name, in the core's order."""
     from elevon import _core
 
@@ -103,7 +105,7 @@ def compile_scenario(scenario: Scenario, wiring: str, fidelity: str) -> Compiled
 
 def _mode(scenario: Scenario, wiring: str) -> str:
     """Return what the command demands; when nothing is given, the first thing the wiring takes."""
-    modes: list[str] = wirings()[wiring]["modes"]
+    modes = wirings()[wiring]["modes"]
     command = scenario.command
     mode = command.mode if "mode" in command.model_fields_set else modes[0]
     if mode not in modes:
@@ -142,9 +144,9 @@ def port_units(mode: str, wiring: str) -> Mapping[str, str]:
     return {**units, "command": wirings()[wiring]["mode_units"][mode]}
 
 
-def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
+def _sequence(steps: Sequence[Action], wiring: str) -> CoreTerm:
     """Return a sequence of actions as a held table of their numbers."""
-    actions: list[str] = wirings()[wiring]["actions"]
+    actions = wirings()[wiring]["actions"]
     times, values = [0.0], [0.0]
     for index, step in enumerate(steps):
         place = f"command.steps[{index}]"
@@ -171,7 +173,7 @@ def _sequence(steps: Sequence[Action], wiring: str) -> dict[str, Any]:
     }
 
 
-def compile_term(term: Term, port_unit: str, place: str) -> dict[str, Any]:
+def compile_term(term: Term, port_unit: str, place: str) -> CoreTerm:
     """Return one term in the core's form; `own` is the unit of the port it drives."""
     """Return one waveform as the core takes it, for a quantity in the SI unit `own`."""
     record = wave_records()[term.kind]
@@ -186,14 +188,15 @@ def compile_term(term: Term, port_unit: str, place: str) -> dict[str, Any]:
             unit = unit_of(parameter, port_unit) or "1"
             values[parameter.name] = _value(given, parameter.name, unit, place)
     check_values(record, values, place)
-    points = _table(term, port_unit, place)
+    times, points = _table(term, port_unit, place)
     if term.kind == TABLE and values["repeat"]:
-        check_repeated(points["times"], values["start"], place)
+        check_repeated(np.asarray(times), values["start"], place)
     return {
         "kind": term.kind,
         "enabled": term.enabled,
         "parameters": list(values.values()),
-        **points,
+        "times": times,
+        "values": points,
     }
 
 
@@ -205,13 +208,13 @@ def _value(given: bool | float | str, name: str, unit: str, place: str) -> float
     return parse_quantity(given, unit, f"{place}: {name}")
 
 
-def _table(term: Term, port_unit: str, place: str) -> dict[str, Any]:
+def _table(term: Term, port_unit: str, place: str) -> tuple[Points, Points]:
     if term.kind != TABLE:
-        return {"times": (), "values": ()}
+        return (), ()
     times, values = term.points()
     check_kind(term.unit or port_unit, port_unit, f"{place}: unit")
     check_kind(term.time_unit, "s", f"{place}: time_unit")
-    return {"times": to_si(times, term.time_unit), "values": to_si(values, term.unit or port_unit)}
+    return to_si(times, term.time_unit), to_si(values, term.unit or port_unit)
 
 
 def _initial(scenario: Scenario, wiring: str, fidelity: str) -> dict[str, float]:

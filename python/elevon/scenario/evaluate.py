@@ -49,7 +49,10 @@ def evaluate_terms(
             continue
         if term.kind == TABLE:
             total += _table(
-                core["times"], core["values"], at, hold=bool(term.arguments.get("hold"))
+                np.asarray(core["times"]),
+                np.asarray(core["values"]),
+                at,
+                hold=bool(term.arguments.get("hold")),
             )
         else:
             total += _core.waveform(term.kind, core["parameters"], at)

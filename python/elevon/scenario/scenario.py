@@ -20,6 +20,7 @@ from pydantic import (
     model_validator,
 )
 
+from elevon.arrays import Floats
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, did_you_mean
 from elevon.faults import Fault
@@ -86,7 +87,7 @@ class Term(BaseModel):
         """The waveform's own parameters as given."""
         return dict(self.model_extra or {})
 
-    def points(self) -> tuple[Any, Any]:
+    def points(self) -> tuple[Floats, Floats]:
         """Return times and values of a table as given, shape (n,) each, from the file if any."""
         if self.file is not None:
             return check_series(*read_series(self.file, "table"), f"table {self.file}")
@@ -278,7 +279,7 @@ class Scenario(_Frozen):
         return validated(cls, data, document)
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], place: str = "scenario") -> Scenario:
+    def from_dict(cls, data: Mapping[str, object], place: str = "scenario") -> Scenario:
         """Build a scenario from nested mappings of the file's form.
 
         Raises
@@ -305,11 +306,11 @@ class Scenario(_Frozen):
         """The duration in s."""
         return parse_quantity(self.duration, "s")
 
-    def replaced(self, **changes: Any) -> Scenario:
+    def replaced(self, **changes: object) -> Scenario:
         """Return a scenario with some of its fields changed, checked as a whole."""
         return Scenario.from_dict({**self.to_dict(), **changes})
 
-    def with_faults(self, faults: Iterable[Fault | str | Mapping[str, Any]]) -> Scenario:
+    def with_faults(self, faults: Iterable[Fault | str | Mapping[str, object]]) -> Scenario:
         """Return a scenario with further faults."""
         return self.replaced(fault=[*self.fault, *faults])
 

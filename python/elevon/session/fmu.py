@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import ArgumentTypeError, FormatError, InputError, unknown
 from elevon.extras import missing_package
 from elevon.scenario.compile import signal_units
@@ -173,7 +174,7 @@ class Fmu:
             finalizer()
             raise
 
-    def outputs(self) -> dict[str, Any]:
+    def outputs(self) -> dict[str, Floats]:
         """Return what it puts out now: input of the session to SI values, shape (runs,)."""
         return {
             link.name: np.array(

@@ -5,12 +5,18 @@ from __future__ import annotations
 import ctypes
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from elevon.errors import ElevonError, ForeignModelError
+
+if TYPE_CHECKING:
+    from fmpy.model_description import ModelDescription, ScalarVariable
+
+#: What a variable takes.
+Value = float | str | bool
 
 _TEXTS = 3  # of the logger that an error quotes
 _WARNING = 1  # status from which a text of the logger is noted
@@ -29,7 +35,7 @@ class FmuInstance:
         Of the instance, for errors.
     """
 
-    def __init__(self, description: Any, folder: Path, name: str) -> None:
+    def __init__(self, description: ModelDescription, folder: Path, name: str) -> None:
         self.name = name
         self._three = description.fmiVersion.startswith("3")
         self._texts: deque[str] = deque(maxlen=_TEXTS)
@@ -41,7 +47,7 @@ class FmuInstance:
         self._call("instantiate", lambda: self._slave.instantiate(**{key: self._logger}))
         self._alive = True
 
-    def _made(self, description: Any, folder: Path) -> Callable[[], Any]:
+    def _made(self, description: ModelDescription, folder: Path) -> Callable[[], Any]:
         from fmpy import fmi2, fmi3
 
         kind = fmi3.FMU3Slave if self._three else fmi2.FMU2Slave
@@ -73,7 +79,7 @@ class FmuInstance:
         if status >= _WARNING and message:
             self._texts.append(message.decode("utf-8", "replace").strip())
 
-    def begin(self, time: float, values: dict[Any, Any]) -> None:
+    def begin(self, time: float, values: Mapping[ScalarVariable, Value]) -> None:
         """Set start values and parameters, and initialise at an instant [s]."""
         if not self._three:
             self._call("set up", lambda: self._slave.setupExperiment(startTime=time))
@@ -83,14 +89,14 @@ class FmuInstance:
         self._call("initialise", lambda: self._slave.enterInitializationMode(**enter))
         self._call("initialise", self._slave.exitInitializationMode)
 
-    def put(self, variable: Any, value: Any) -> None:
+    def put(self, variable: ScalarVariable, value: Value) -> None:
         """Set a variable."""
         put = getattr(self._slave, f"set{self._type(variable)}")
         self._call(
             f"set {variable.name} = {value}", lambda: put([variable.valueReference], [value])
         )
 
-    def get(self, variable: Any) -> float:
+    def get(self, variable: ScalarVariable) -> float:
         """Return a variable as a number.
 
         Raises

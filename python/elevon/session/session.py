@@ -16,6 +16,7 @@ from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario import Terms
 from elevon.scenario.compile import compile_term, port_units, signal_records
+from elevon.seam import CoreTerm
 from elevon.session.coupling import coupled
 from elevon.session.divergence import diverged_error, diverged_runs
 from elevon.session.fmu import Fmu
@@ -236,7 +237,7 @@ class Session:
     def _ipython_key_completions_(self) -> list[str]:
         return self.names
 
-    def set(self, **inputs: Value | Mapping[str, Any]) -> None:
+    def set(self, **inputs: Value | Mapping[str, object]) -> None:
         """Set inputs, held from now on: ``command``, ``supply``, ``output``, ``ambient``...
 
         Parameters
@@ -271,7 +272,7 @@ class Session:
         return lambda: bool(self._core.set_values(port, read))
 
     @staticmethod
-    def _terms(port: str, given: Mapping[str, Any], unit: str) -> list[dict[str, Any]]:
+    def _terms(port: str, given: Mapping[str, Any], unit: str) -> list[CoreTerm]:
         """Return a waveform, or a sum of them, as the core takes it."""
         place = Document(port, "", {})
         sum_ = validated(Terms, given if "terms" in given else {"terms": [given]}, place)
@@ -363,7 +364,7 @@ class Session:
     def run(
         self,
         duration: float | str,
-        controller: Callable[[Session], Any] | None = None,
+        controller: Callable[[Session], object] | None = None,
         *,
         period: float | str = "1 ms",
         record: Iterable[str] = ("command", "output_position"),

@@ -11,6 +11,7 @@ from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrup
 from elevon.faults import Fault
 from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
+from elevon.seam import CoreResult
 from elevon.simulate.acting import report
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, changed
 from elevon.simulate.prepare import Features, Prepared, Record, Run, prepare, prepare_named
@@ -190,13 +191,13 @@ def simulate_prepared(
     threads: int | None = None,
     lanes: str = "auto",
     progress: Progress | None = None,
-) -> list[dict[str, Any]]:
+) -> list[CoreResult]:
     """Simulate runs that are ready for the core; return what it says of each, in their order.
 
     Errors as `simulate_batch`. Each result has ``status``, ``message``, ``time``, ``steps`` and
     ``clocks``: name to ``time``, shape (n,), and ``values``, shape (n, signals + faults).
     """
-    results: list[dict[str, Any]] = [{}] * len(prepared)
+    results: dict[int, CoreResult] = {}
     done = 0
     for group in _groups(prepared):
         share = _share(progress, done, len(group), len(prepared))
@@ -206,7 +207,7 @@ def simulate_prepared(
         ):
             results[index] = result
         done += len(group)
-    return results
+    return [results[index] for index in range(len(prepared))]
 
 
 #: More threads than this are no wish but a slip.
@@ -270,7 +271,7 @@ def _run_core(
     threads: int | None,
     lanes: str,
     progress: Callable[[float], bool],
-) -> list[dict[str, Any]]:
+) -> list[CoreResult]:
     from elevon import _core
 
     first = part[0]

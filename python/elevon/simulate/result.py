@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from elevon.faults import find_record
 from elevon.record_plan import ClockPlan
 from elevon.recording import Channel, Clock, Recording
 from elevon.scenario.compile import signal_records
+from elevon.seam import CoreResult
 from elevon.simulate.prepare import Prepared, Run
 
 Value = TypeVar("Value")
@@ -23,7 +24,7 @@ def build_recording(
     run: Run,
     prepared: Prepared,
     fidelity: str,
-    result: Mapping[str, Any],
+    result: CoreResult,
     shared: dict[tuple[str, float, int], Clock],
 ) -> Recording:
     """Return one result of the core with names, units, labels and what is known about it.
@@ -83,7 +84,7 @@ def _layout(wiring: str, fidelity: str, command_unit: str, plans: tuple[ClockPla
         return name, unit, known[name]["text"]
 
     # Of several the last, since a sensor stands behind what it senses.
-    played = {name: item.get("role") for name, item in known.items() if name in recorded}
+    played = {name: item["role"] for name, item in known.items() if name in recorded}
     return _Layout(
         tuple(tuple(described(name) for name in plan.signals) for plan in plans),
         {role: name for name, role in played.items() if role},
@@ -100,7 +101,19 @@ def _severities(
         yield Channel(label["channel"], label["unit"], values[:, column], clock, text)
 
 
-def fault_labels(prepared: Prepared) -> list[dict[str, Any]]:
+class FaultLabel(TypedDict):
+    """One fault of a run: where its severity is recorded, and what it is."""
+
+    channel: str
+    kind: str
+    place: str
+    severity: float
+    unit: str
+    attributes: Mapping[str, float]
+    profile: str
+
+
+def fault_labels(prepared: Prepared) -> list[FaultLabel]:
     """Return the label of each fault of a run: channel, kind, place, severity, unit, profile."""
     wiring = prepared.actuator.wiring
     return [
@@ -118,7 +131,7 @@ def fault_labels(prepared: Prepared) -> list[dict[str, Any]]:
 
 
 def _meta(
-    run: Run, prepared: Prepared, fidelity: str, result: Mapping[str, Any], layout: _Layout
+    run: Run, prepared: Prepared, fidelity: str, result: CoreResult, layout: _Layout
 ) -> dict[str, Any]:
     from elevon import _core
 
@@ -147,7 +160,7 @@ def _meta(
     }
 
 
-def _features(prepared: Prepared, result: Mapping[str, Any]) -> dict[str, Any]:
+def _features(prepared: Prepared, result: CoreResult) -> dict[str, Any]:
     """Features of the run, None where there is none; nothing where none were requested."""
     if not prepared.features:
         return {}

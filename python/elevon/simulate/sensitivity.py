@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
@@ -12,6 +11,7 @@ from elevon.errors import InputError, Interrupted, RangeError
 from elevon.parameters.records import record_of
 from elevon.recording import Recording
 from elevon.scenario import Scenario
+from elevon.seam import CoreResult, CoreRows
 from elevon.simulate.acting import report
 from elevon.simulate.prepare import Prepared, Record, Run, prepare
 from elevon.simulate.result import build_recording
@@ -133,13 +133,13 @@ def _assembled(
     prepared: Prepared,
     fidelity: str,
     names: Sequence[str],
-    passes: Sequence[Mapping[str, Any]],
+    passes: Sequence[CoreResult],
 ) -> Sensitivities:
     from elevon import _core
 
     count = _core.derivatives_per_pass()
     derivatives: dict[str, dict[str, Floats]] = {name: {} for name in names}
-    clocks: dict[str, dict[str, Any]] = {}
+    clocks: dict[str, CoreRows] = {}
     for number, item in enumerate(passes):
         chosen = names[number * count : (number + 1) * count]
         width = 1 + len(chosen)
@@ -150,5 +150,5 @@ def _assembled(
             for column, signal in enumerate(plan.signals):
                 for place, name in enumerate(chosen):
                     derivatives[name][signal] = values[:, column, 1 + place]
-    result = {**passes[0], "clocks": clocks}
+    result: CoreResult = {**passes[0], "clocks": clocks}
     return Sensitivities(build_recording(run, prepared, fidelity, result, {}), derivatives)

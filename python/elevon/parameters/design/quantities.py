@@ -135,7 +135,7 @@ def _named(table: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return [*plain, *((f"motor.{name}", raw) for name, raw in inner)]
 
 
-def read_number(record: Record, raw: Any, place: str, source: str | None) -> Parameter:
+def read_number(record: Record, raw: object, place: str, source: str | None) -> Parameter:
     """Read one number of a design; a text has a unit where the quantity has one."""
     if isinstance(raw, bool) or not isinstance(raw, (int, float, str)):
         raise InputError(f"{place}: write a number with its unit, such as '28 V'")

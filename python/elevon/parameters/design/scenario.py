@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from elevon.parameters.parameter import Parameter
 
 
-def design_scenario(design: Mapping[str, Parameter]) -> Mapping[str, Any]:
+def design_scenario(design: Mapping[str, Parameter]) -> Mapping[str, object]:
     """Return a sine over a fifth of the stroke whose peak rate is half the rated speed.
 
     Parameters

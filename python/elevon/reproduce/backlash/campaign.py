@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from elevon.errors import SimulationError
 from elevon.progress import Progress
@@ -53,7 +52,7 @@ class RowResult:
         """Recovered less put in."""
         return self.backlash_out_deg - self.backlash_in_deg
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return one row of the command's JSON object."""
         return {
             "row": self.measured.row,
@@ -82,7 +81,7 @@ class BacklashResult:
     blank: Recording
     checks: list[Check]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command."""
         runs = [self.blank, *self.recordings]
         return {

@@ -69,7 +69,7 @@ class ComplianceResult:
         """Rows whose motor and encoder columns are exchanged."""
         return sorted(slip.row for slip in self.slips if slip.kind == "swapped")
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command."""
         low, high = self.interval
         stiffness = self.robust.stiffness * NM_PER_RAD

@@ -62,7 +62,7 @@ class BaselineRow:
         values = [run[column] for run in self.runs]
         return float(np.std(values, ddof=1)) if len(values) > 1 else float("nan")
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return one row of the command's JSON object, in the units of the columns."""
         numbers = {name: _rounded(self.mean(name), MEASURES[name][2]) for name in MEASURES}
         return {
@@ -108,7 +108,7 @@ class BaselineResult:
     corners: list[dict[str, Any]] = field(default_factory=list)
     meta: dict[str, Any] = field(default_factory=dict)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command."""
         effects = [
             {"response": name, "unit": MEASURES[name][1], "term": e.term, "effect": e.effect,

@@ -97,7 +97,7 @@ class CurrentResult:
             checks.append(Check(name, self.summary(state)[0], most, "%"))
         return checks
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command."""
         names = ("average", "maximum", "minimum")
         return {

@@ -95,7 +95,7 @@ class MotionProfile:
         holds = 2.0 * HOLD if self.name == "trapezoidal" else 0.0
         return 4.0 * self.amplitude / self.rate + holds
 
-    def term(self) -> dict[str, Any]:
+    def term(self) -> dict[str, object]:
         """Return the waveform; every profile starts at mid-stroke."""
         a, v = self.amplitude, self.rate
         if a == 0.0:

@@ -64,7 +64,7 @@ class SeparationRow:
     power: float
     draws: int | None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return one row of the command's JSON object."""
         return {
             "fault": self.fault,

@@ -55,7 +55,7 @@ class ThermalResult:
     fit: DemaFit | None = None
     meta: dict[str, Any] = field(default_factory=dict)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object of the command."""
         rows = [
             {"time_s": t, "winding_k": w, "surface_k": s, "heat_w": p}
