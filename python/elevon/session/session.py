@@ -8,20 +8,18 @@ from contextlib import contextmanager, nullcontext
 from typing import Any
 
 from elevon.actuator import Actuator
-from elevon.documents import Document, validated
 from elevon.errors import ArgumentTypeError, InputError, unknown
 from elevon.faults import Fault
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.scenario import Terms
-from elevon.scenario.compile import compile_term, port_units, signal_records
-from elevon.seam import CoreTerm
+from elevon.scenario.compile import port_units
 from elevon.session.coupling import coupled
 from elevon.session.divergence import diverged_error, diverged_runs
 from elevon.session.fmu import Fmu
+from elevon.session.inputs import SignalIndex, input_change, left_out
 from elevon.session.start import SessionState, announced, fault_places, runs_of
-from elevon.session.values import Value, one_each, quantity, text, texts, whole_steps
+from elevon.session.values import Value, one_each, text, texts, whole_steps
 from elevon.simulate.acting import report
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike
 from elevon.simulate.prepare import Run, prepare, solver_step
@@ -115,7 +113,7 @@ class Session:
         self._units = [port_units(mode, self.wiring) for mode in self._modes]
         self._faults: tuple[dict[str, int], ...] = tuple(fault_places(run.scenario) for run in runs)
         self.step = solver_step(self.actuators[0], fidelity)
-        self._index = {name: i for i, name in enumerate(signal_records(self.wiring, fidelity))}
+        self._signals = SignalIndex(self.wiring, fidelity)
         from elevon import _core
 
         self._core = _core.Session(
@@ -123,10 +121,9 @@ class Session:
             fidelity,
             [{**item.core, "duration": _FOREVER * self.step} for item in prepared],
             announced(self.wiring, tunable, faults),
-            [self._known(name) for name in texts(signals, "signals")],
+            [self._signals.known(name) for name in texts(signals, "signals")],
             text(lanes, "lanes"),
         )
-        self._readable: dict[str, bool] = {}
         self._driven: set[str] = set()
         self._diverged: set[int] = set()
         self._coupling = None
@@ -175,7 +172,7 @@ class Session:
     @property
     def names(self) -> list[str]:
         """The signals that exist."""
-        return list(self._index)
+        return list(self._signals.places)
 
     def advance(self, duration: float | str) -> None:
         """Step on.
@@ -226,7 +223,7 @@ class Session:
         InputError
             A signal that needs equations the session left out.
         """
-        table = self._core.read([self._place(name) for name in names])
+        table = self._core.read([self._signals.place(name, self._core) for name in names])
         if self.many:
             return {name: table[:, column] for column, name in enumerate(names)}
         return {name: float(value) for name, value in zip(names, table[0], strict=True)}
@@ -251,32 +248,18 @@ class Session:
         InputError
             No such input, a unit of another kind, a value that is not a number.
         """
-        changes = {port: self._change(port, value) for port, value in inputs.items()}
+        for port in inputs:
+            self.unit(port)
+        changes = {
+            port: input_change(self._core, port, value, self._units)
+            for port, value in inputs.items()
+        }
         with nullcontext() if self._driven.issuperset(changes) else self._whole():
             for port, change in changes.items():
                 if not change():
                     how = "announce it with a scenario that drives it from the start"
                     raise InputError(f"{port}: the equations in use leave this input out; {how}")
         self._driven.update(changes)
-
-    def _change(self, port: str, value: Value | Mapping[str, Any]) -> Callable[[], bool]:
-        """Return the change of an input, checked: several change together or not at all."""
-        self.unit(port)
-        if isinstance(value, Mapping):
-            sums = [self._terms(port, value, units[port]) for units in self._units]
-            return lambda: all(
-                self._core.set_input(run, port, sum_) for run, sum_ in enumerate(sums)
-            )
-        given = zip(one_each(value, len(self), port), self._units, strict=True)
-        read = [quantity(each, units[port] or "1", port) for each, units in given]
-        return lambda: bool(self._core.set_values(port, read))
-
-    @staticmethod
-    def _terms(port: str, given: Mapping[str, Any], unit: str) -> list[CoreTerm]:
-        """Return a waveform, or a sum of them, as the core takes it."""
-        place = Document(port, "", {})
-        sum_ = validated(Terms, given if "terms" in given else {"terms": [given]}, place)
-        return [compile_term(term, unit, port) for term in sum_.terms]
 
     def set_parameter(self, path: str, value: Value) -> None:
         """Give a parameter another value, from now on, beneath the faults that act on it.
@@ -300,7 +283,7 @@ class Session:
             for run, actuator in enumerate(changed):
                 number = record.number(actuator.parameters[path].value)
                 if not self._core.set_parameter(run, path, number):
-                    raise self._left_out(path, "tunable")
+                    raise left_out(path, "tunable")
             self.actuators = tuple(changed)
 
     def set_fault(self, name: str, severity: Value, **attributes: float | str) -> None:
@@ -331,7 +314,7 @@ class Session:
                 places = self._faults[run]
                 at = places.get(name, len(places))
                 if not self._core.set_fault(run, at, fault):
-                    raise self._left_out(name, "faults")
+                    raise left_out(name, "faults")
                 places.setdefault(name, len(places))
 
     def announce(
@@ -357,9 +340,9 @@ class Session:
             No such parameter, fault or signal.
         """
         paths = announced(self.wiring, tunable, faults)
-        names = [self._known(name) for name in texts(signals, "signals")]
+        names = [self._signals.known(name) for name in texts(signals, "signals")]
         self._core.announce(paths, names)
-        self._readable.clear()
+        self._signals.renew()
 
     def run(
         self,
@@ -397,7 +380,7 @@ class Session:
         self._core = state.core.copy()
         self.actuators = state.actuators
         self._faults = tuple(dict(item) for item in state.faults)
-        self._readable.clear()
+        self._signals.renew()
         self._driven.clear()
         self._diverged = diverged_runs(self._core, len(self))
 
@@ -410,23 +393,3 @@ class Session:
         except BaseException:
             self.restore(state)
             raise
-
-    def _known(self, name: str) -> str:
-        if text(name, "signal") not in self._index:
-            raise unknown("signal", name, self._index, "session")
-        return name
-
-    def _place(self, name: str) -> int:
-        index = self._index[self._known(name)]
-        if name not in self._readable:
-            self._readable[name] = self._core.carries([name])
-        if not self._readable[name]:
-            raise self._left_out(name, "signals")
-        return index
-
-    @staticmethod
-    def _left_out(name: str, option: str) -> InputError:
-        return InputError(
-            f"{name}: the equations in use leave it out; announce it: Session(..., "
-            f"{option}=[{name!r}])"
-        )
