@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from elevon.units import check_kind, shown_unit, to_display
+from elevon.units import check_kind, display_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -58,7 +58,7 @@ def estimate_texts(
     written : str, optional
         The unit in which the actuator file gives the parameter, which is preferred.
     """
-    display = written or shown_unit(unit)
+    display = written or display_unit(unit)
     check_kind(display, unit)
     value_, low, high = (float(to_display(x, display)) for x in (value, *interval))
     return (*interval_texts(value_, low, high), "" if display == "1" else display)
@@ -74,7 +74,7 @@ def estimate_row(item: Estimate, actuator: Actuator, *more: str) -> tuple[str, .
 
 def severity_texts(value: float, interval: tuple[float, float], unit: str) -> tuple[str, str, str]:
     """Return a severity and its interval as a person writes it: angles in deg, shares in %."""
-    display = "%" if unit == "1" else shown_unit(unit)
+    display = "%" if unit == "1" else display_unit(unit)
     texts = interval_texts(*(float(to_display(x, display)) for x in (value, *interval)))
     first, low, high = (f"{text} {display}" for text in texts)
     return first, low, high
@@ -91,7 +91,7 @@ def quantity_text(value: float, unit: str, digits: int = _DIGITS) -> tuple[str, 
 
     A temperature stays in K: a difference has no zero to be counted from.
     """
-    display = unit if unit in {"", "1", "K"} else shown_unit(unit)
+    display = unit if unit in {"", "1", "K"} else display_unit(unit)
     return (
         f"{float(to_display(value, display or '1')):.{digits}g}",
         "" if display == "1" else display,

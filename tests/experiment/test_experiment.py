@@ -5,7 +5,7 @@ import pytest
 
 from elevon import Actuator, Scenario, simulate
 from elevon.errors import InputError, UnknownNameError
-from elevon.experiment import Experiment, Inputs, Sensor, Variant, run_all, shown_by
+from elevon.experiment import Experiment, Inputs, Sensor, Variant, run_all, signals_by_role
 from elevon.logs.log import Log
 
 SHOWS = {"motor_speed": "motor_speed", "torque_current": "current_q_meas"}
@@ -90,5 +90,5 @@ def test_what_cannot_be_run_is_refused(unit, wave):
 
 
 def test_a_sensor_is_shown_before_what_is_true():
-    assert shown_by("rotary", "low")["output_position"] == "encoder_position"
-    assert None not in shown_by("landing_gear", "low")
+    assert signals_by_role("rotary", "low")["output_position"] == "encoder_position"
+    assert None not in signals_by_role("landing_gear", "low")

@@ -12,7 +12,7 @@ from records import code, plain
 
 import elevon
 from elevon.reproduce.signatures import Signature, reproduce_signatures
-from elevon.units import format_quantity, shown_unit
+from elevon.units import display_unit, format_quantity
 
 COLOURS = ("#1f5fa8", "#b3261e")  # healthy, faulty: on white, contrast above 4.5
 
@@ -54,7 +54,7 @@ def gallery(rows: Sequence[Signature]) -> Iterator[tuple[str, bytes]]:
 
 def entry(row: Signature, name: str) -> str:
     """Return the part of the page that is one fault's."""
-    severity = format_quantity(row.severity, shown_unit(row.unit), 3)
+    severity = format_quantity(row.severity, display_unit(row.unit), 3)
     places = ", ".join(code(place) for place in row.places)
     words = f"elevon simulate {row.actuator} --fault '{row.kind}@{row.place}={severity}'"
     alt = f"{row.signal} of {row.actuator}, healthy and with {row.kind}".replace("_", " ")

@@ -63,11 +63,11 @@ class ModelRuns:
         """Run every log at every point, one batch; result[point][log], None where it diverged."""
         if not self.check():
             raise Interrupted("calibration stopped")
-        todo = [
+        wanted = [
             (item, self.variant(item.log, point)) for point in points for item in self.experiments
         ]
-        self.runs += len(todo)
-        runs = iter(run_all(todo, lambda _fraction: self.check()))
+        self.runs += len(wanted)
+        runs = iter(run_all(wanted, lambda _fraction: self.check()))
         return [
             [
                 run.seen(log, self.sensors(log, point)) if (run := next(runs)).complete else None

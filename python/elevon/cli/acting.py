@@ -41,10 +41,10 @@ def chosen(record: Acting, fidelity: str | None, not_modelled: bool) -> bool:
 
 def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, object]:
     """Drives under which a fault of an actuator acts, and where it rests with the reasons."""
-    from elevon.simulate.own_faults import resting, shown_drives
+    from elevon.simulate.own_faults import drive_kinds, resting
 
     neutral = resting(actuator, record)
-    drives = shown_drives(actuator)
+    drives = drive_kinds(actuator)
     idle = {(item.fidelity, item.drive, item.place) for item in neutral}
     acting = {
         fidelity: [

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from elevon.cli.output import say
 from elevon.errors import UnitError
-from elevon.units import format_quantity, shown_unit, split_quantity
+from elevon.units import display_unit, format_quantity, split_quantity
 
 if TYPE_CHECKING:
     from elevon.faults import Fault, FaultRecord
@@ -32,7 +32,7 @@ def read_faults(texts: Sequence[str] | None, wiring: str) -> list[Fault]:
         parts = split_quantity(str(fault.severity))
         unit = record.unit or "1"
         if unit != "1" and parts is not None and not parts[1] and float(parts[0]) != 0.0:
-            display = shown_unit(unit)
+            display = display_unit(unit)
             raise UnitError(
                 f"{name}: {parts[0]} has no unit; write '{parts[0]} {display}'"
                 + (f" or '{parts[0]} {unit}'" if display != unit else "")
@@ -47,7 +47,7 @@ def _in_words(record: FaultRecord, fault: Fault, name: str) -> str:
     value = record.read_severity(fault.severity, name)
     unit = record.unit or "1"
     if unit != "1":
-        return format_quantity(value, shown_unit(unit))
+        return format_quantity(value, display_unit(unit))
     if record.effect.startswith("1: "):
         return f"{value:g}"
     return f"{100.0 * value:{'+' if record.maximum > 1.0 else ''}.6g} %"

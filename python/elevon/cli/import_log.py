@@ -11,7 +11,7 @@ from elevon.cli import common
 from elevon.cli.output import answer, print_table, say
 from elevon.cli.shell import Answer, command
 from elevon.errors import InputError
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.logs.importing import ImportedLog
@@ -178,8 +178,8 @@ def _result(imported: list[ImportedLog], targets: list[Path]) -> dict[str, Any]:
 def _show(report: ImportReport, target: Path) -> None:
     title = f"{report.source} ({report.file_format}) -> {target}"
     rows = [
-        (c["name"], c["column"], shown_unit(c["unit"]), _bound(c, "minimum"), _bound(c, "maximum"),
-         c["missing"])
+        (c["name"], c["column"], display_unit(c["unit"]), _bound(c, "minimum"),
+         _bound(c, "maximum"), c["missing"])
         for c in report.channels
     ]  # fmt: skip
     print_table(("channel", "column", "unit", "minimum", "maximum", "missing"), rows, title=title)
@@ -198,7 +198,7 @@ def _show(report: ImportReport, target: Path) -> None:
 
 
 def _bound(channel: dict[str, Any], name: str) -> str:
-    return _number(float(to_display(channel[name], shown_unit(channel["unit"]))))
+    return _number(float(to_display(channel[name], display_unit(channel["unit"]))))
 
 
 def _number(value: Any) -> str:

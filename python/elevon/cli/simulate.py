@@ -157,13 +157,13 @@ def _print_result(recording: Any, wiring: str) -> None:
         lines = [[f"{event['time_s']:.3f}", event["text"]] for event in events]
         print_table(("time [s]", "event"), lines or [["", "nothing changed"]])
         typer.echo("")
-    from elevon.units import shown_unit, to_display
+    from elevon.units import display_unit, to_display
 
     rows = []
     for channel in recording.channels:
         name, values = channel.name, channel.values
         words = code_names(wiring, name) if events is not None and name in _WORDS else {}
-        unit = shown_unit(channel.unit or "1")
+        unit = display_unit(channel.unit or "1")
         if not len(channel):
             rows.append([name, unit, "", "", ""])
         elif words:

@@ -98,7 +98,7 @@ class Experiment:
         notices: bool = False,
     ) -> None:
         self.log, self.actuator, self.fidelity = log, actuator, fidelity
-        served = shown_by(actuator.wiring, fidelity) if shows is None else shows
+        served = signals_by_role(actuator.wiring, fidelity) if shows is None else shows
         self.shows = {r: s for r, s in served.items() if shows is not None or r in log.channels}
         record = f"{','.join(dict.fromkeys(self.shows.values()))}@{rate}"
         known = inputs if isinstance(inputs, Scenario) else inputs.scenario()
@@ -229,7 +229,7 @@ def run_all(
     return [experiment._read(r) for (experiment, _), r in zip(runs, results, strict=True)]
 
 
-def shown_by(wiring: str, fidelity: str) -> dict[str, str]:
+def signals_by_role(wiring: str, fidelity: str) -> dict[str, str]:
     """Return role to signal; what a sensor shows before what is true."""
     records = signal_records(wiring, fidelity)
     return {item["role"]: name for name, item in records.items() if item["role"] is not None}

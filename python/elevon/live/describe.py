@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from elevon.faults import FaultRecord, catalogue
 from elevon.parameters.records import records, wirings
 from elevon.scenario.compile import signal_records
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 from elevon.waveforms import wave_records
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ _GEOMETRY = (
 
 def unit_text(unit: str) -> dict[str, object]:
     """Return the unit in which a person reads a quantity, and how SI becomes it."""
-    display = "degC" if unit == "K" else shown_unit(unit)
+    display = "degC" if unit == "K" else display_unit(unit)
     if unit == "K":
         return {"unit": unit, "shown": "°C", "scale": 1.0, "offset": -273.15}
     text = "" if display == "1" else display.replace("deg", "°")

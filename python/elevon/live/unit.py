@@ -15,7 +15,7 @@ from elevon.parameters.records import wirings
 from elevon.scenario import Command, Terms
 from elevon.scenario.compile import port_units, signal_records
 from elevon.session import Session
-from elevon.units import parse_quantity, shown_unit
+from elevon.units import display_unit, parse_quantity
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -302,7 +302,7 @@ class LiveUnit:
             return
         if isinstance(value, bool) or not isinstance(value, (int, float, str)):
             raise ArgumentTypeError(f"{name}: {value!r:.60} is no value")
-        number = parse_quantity(value, span.unit, name, shown_unit(span.unit))
+        number = parse_quantity(value, span.unit, name, display_unit(span.unit))
         check_value(name, number, span)
         self._session.set(**{name: number})
 

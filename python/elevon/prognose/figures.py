@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.prognose.observation import Inspection
 from elevon.report.figures import COLOURS, new_figure
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def severity_unit(unit: str) -> str:
     """Return the unit severities are displayed in: shares in percent, lengths in millimetres."""
-    return {"1": "%", "m": "mm"}.get(unit, shown_unit(unit))
+    return {"1": "%", "m": "mm"}.get(unit, display_unit(unit))
 
 
 def course_figure(

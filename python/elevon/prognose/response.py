@@ -11,7 +11,7 @@ from elevon.arrays import Floats
 from elevon.prognose.grid import Grid
 from elevon.prognose.law import Law
 from elevon.prognose.requirement import SEVERITY, Requirement
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def check_start(response: ResponseTables, severity: Floats) -> list[str]:
     for k, requirement in enumerate(response.requirements):
         if reserve[k] < 0.0:
             sign = "least" if requirement.at_least else "limit"
-            unit = shown_unit(response.units[k])
+            unit = display_unit(response.units[k])
             value, limit = (
                 f"{to_display(x, unit):.4g} {unit}" for x in (values[k], response.thresholds[k])
             )

@@ -15,7 +15,7 @@ from elevon.prognose.law import Law
 from elevon.prognose.requirement import MEASURES, SEVERITY, Requirement, RunSignals
 from elevon.prognose.response import ResponseTables
 from elevon.progress import Progress
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -126,7 +126,7 @@ def _check_capability(actuator: Actuator, flown: RunSignals) -> None:
         return
     commanded, done = (float(np.ptp(flown[role])) for role in ("command", "output_position"))
     if done < _FOLLOWED * commanded:
-        unit = shown_unit(units["output_position"])
+        unit = display_unit(units["output_position"])
         raise InputError(
             f"the mission is outside the capability of {actuator.name}: the healthy unit travels "
             f"{to_display(done, unit):.4g} {unit} of the {to_display(commanded, unit):.4g} {unit} "

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.report.cards import Html, badge, card, sparkline, table
-from elevon.units import shown_unit
+from elevon.units import display_unit
 
 if TYPE_CHECKING:
     from elevon.recording.channel import Channel
@@ -30,7 +30,7 @@ def _clock(clock: object) -> str:
 
 
 def _row(channel: Channel, name_clock: bool) -> list[object]:
-    unit = shown_unit(channel.unit)
+    unit = display_unit(channel.unit)
     values = channel.to(unit)
     good = values[np.isfinite(values)]
     numbers = (good.min(), good.max(), values[-1]) if good.size else ("", "", "")

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.recording.states import code_names
-from elevon.units import format_quantity, shown_unit, to_display
+from elevon.units import display_unit, format_quantity, to_display
 
 if TYPE_CHECKING:
     from elevon.recording.channel import Channel
@@ -159,7 +159,7 @@ def _over_ratio(motor: Channel, output: Channel) -> tuple[str, Floats] | None:
 
 
 def _unit(channel: Channel) -> str:
-    return {"m": "mm", "m/s": "mm/s"}.get(channel.unit, shown_unit(channel.unit))
+    return {"m": "mm", "m/s": "mm/s"}.get(channel.unit, display_unit(channel.unit))
 
 
 def _error(command: Channel, answer: Channel) -> Panel:
@@ -209,7 +209,7 @@ def bands(recording: Recording) -> list[Band]:
 def _fault(channel: Channel, label: dict[str, object]) -> Iterator[Band]:
     severity = label.get("severity")
     if isinstance(severity, (int, float)):
-        severity = format_quantity(severity, shown_unit(str(label.get("unit") or "1")), 4)
+        severity = format_quantity(severity, display_unit(str(label.get("unit") or "1")), 4)
     text = f"{label.get('kind')}@{label.get('place')} = {severity}"
     for start, end in _stretches(channel.values != 0.0, channel.time):
         yield Band(start, end, text, "fault")

@@ -13,7 +13,7 @@ from elevon.errors import InputError, unknown
 from elevon.files import atomic_path, check_output, write_text
 from elevon.recording.channel import Channel
 from elevon.recording.overview import Band, Panel, bands, overlaid, overview, spectra
-from elevon.units import shown_unit
+from elevon.units import display_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,7 +81,7 @@ def _panels(channels: list[Channel], units: Mapping[str, str]) -> list[Panel]:
     """Group channels that share a clock and a unit."""
     panels: dict[tuple[str, str], Panel] = {}
     for channel in channels:
-        unit = units.get(channel.name) or shown_unit(channel.unit)
+        unit = units.get(channel.name) or display_unit(channel.unit)
         clock = channel.clock
         panel = panels.setdefault(
             (clock.name, unit), Panel("", unit, clock.time, {}, tuple(clock.gaps), clock.name)

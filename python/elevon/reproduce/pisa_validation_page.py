@@ -9,7 +9,7 @@ from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_validation import DISPLAYED, ValidationResult
 from elevon.reproduce.provenance import provenance
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 
 _AXES = {
     "output_position": ("Position [mm]", 1e3),
@@ -50,7 +50,7 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
 
 
 def _row(row: Mapping[str, Any]) -> list[object]:
-    unit = shown_unit(row["unit"])
+    unit = display_unit(row["unit"])
     return [
         row["stroke"],
         row["signal"].replace("_", " "),

@@ -8,7 +8,7 @@ import numpy as np
 
 from elevon.report import Report, ReportTable
 from elevon.report.figures import new_figure
-from elevon.units import format_quantity, shown_unit, to_display
+from elevon.units import display_unit, format_quantity, to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ def signatures_page(result: SignaturesResult, date: str | None = None) -> Report
 
 
 def _caption(item: Signature) -> str:
-    severity = format_quantity(item.severity, shown_unit(item.unit), 3)
+    severity = format_quantity(item.severity, display_unit(item.unit), 3)
     others = f"; also at {', '.join(item.places[1:])}" if len(item.places) > 1 else ""
     return f"{item.kind}@{item.place} = {severity}: {item.effect}{others}. Run: {item.status}."
 

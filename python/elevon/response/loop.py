@@ -24,7 +24,7 @@ from elevon.response.measure import Multisine, frequencies, require_finished, sc
 from elevon.results import Result
 from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
-from elevon.units import parse_quantity, shown_unit
+from elevon.units import display_unit, parse_quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -191,7 +191,7 @@ def loop_response(
     mode = "torque" if loop == "current" else loop
     command, feedback, factor = _signals(loaded, loop)
     unit, size = _amplitude(loaded, loop, amplitude)
-    mean = parse_quantity(bias, unit, "bias", shown_unit(unit))
+    mean = parse_quantity(bias, unit, "bias", display_unit(unit))
     design = Multisine(first, last, step, lines=_LINES, falling=loop != "current")
     generator = np.random.default_rng(seed)
     runs = []
@@ -257,7 +257,7 @@ def _amplitude(actuator: Actuator, loop: str, amplitude: float | str | None) -> 
     place = signal_units(actuator.wiring, "high")["output_position"]
     unit = {"position": place, "speed": "rad/s", "current": "N m"}[loop]
     given = _SIZE[loop][place == "m"] if amplitude is None else amplitude
-    size = parse_quantity(given, unit, "amplitude", shown_unit(unit))
+    size = parse_quantity(given, unit, "amplitude", display_unit(unit))
     if not size > 0.0:
         raise InputError(f"amplitude = {amplitude} must be positive")
     return unit, size

@@ -15,7 +15,7 @@ from elevon.scenario import Scenario
 from elevon.scenario.compile import signal_units
 from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
-from elevon.units import parse_quantity, shown_unit
+from elevon.units import display_unit, parse_quantity
 
 METHODS = ("multisine", "sweep")
 _MOST = 24  # lines of a multisine: about ten in a decade are read well from a plot
@@ -94,7 +94,7 @@ def frequency_response(
         raise unknown("signal", output, units, "output")
     unit = unit_of_command[mode] or units["output_position"]
     first, last = frequencies(low, high)
-    size = parse_quantity(amplitude, unit, "amplitude", shown_unit(unit))
+    size = parse_quantity(amplitude, unit, "amplitude", display_unit(unit))
     if not size > 0.0:
         raise InputError(f"amplitude = {amplitude} must be positive")
     if realisations < 1:
@@ -102,7 +102,7 @@ def frequency_response(
     design = (Multisine if method == "multisine" else _Sweep)(
         first, last, solver_step(loaded, fidelity)
     )
-    mean = parse_quantity(bias, unit, "bias", shown_unit(unit))
+    mean = parse_quantity(bias, unit, "bias", display_unit(unit))
     generator = np.random.default_rng(seed)
     runs = []
     for number in range(realisations):

@@ -11,7 +11,7 @@ from typing import Any
 
 from elevon.documents import Document
 from elevon.errors import UnitError
-from elevon.units import ambiguous, is_ambiguous, shown_unit
+from elevon.units import ambiguous, display_unit, is_ambiguous
 from elevon.waveforms import TABLE, unit_of, wave_records
 
 _SPEED = {"rig_speed": "m/s"}
@@ -73,7 +73,7 @@ def _numbers(data: Mapping[str, Any]) -> Iterator[Finding]:
     for name, value in initial.items() if isinstance(initial, Mapping) else ():
         units = tuple(unit for unit in _initial_units().get(str(name), ()) if unit)
         if _is_number(value):
-            yield ("initial", name), value, units, tuple(shown_unit(unit) for unit in units)
+            yield ("initial", name), value, units, tuple(display_unit(unit) for unit in units)
 
 
 def _of_terms(
@@ -90,7 +90,7 @@ def _of_terms(
             if _is_number(value):
                 units = tuple(unit_of(parameter, unit) or "1" for unit in port_units) or ("1",)
                 display_units = tuple(
-                    unit_of(parameter, shown_unit(unit)) or "1" for unit in port_units
+                    unit_of(parameter, display_unit(unit)) or "1" for unit in port_units
                 ) or ("1",)
                 if parameter.unit == "rad":
                     display_units = ("deg",) * len(units)
@@ -106,7 +106,12 @@ def _of_table(
     values = term.get("values")
     for value in values if isinstance(values, list) else ():
         if _is_number(value) and value:
-            yield (*at, "values"), value, port_units, tuple(shown_unit(unit) for unit in port_units)
+            yield (
+                (*at, "values"),
+                value,
+                port_units,
+                tuple(display_unit(unit) for unit in port_units),
+            )
             return
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import ArgumentTypeError, InputError
-from elevon.units import parse_quantity, shown_unit
+from elevon.units import display_unit, parse_quantity
 
 Value = float | str | Sequence[float] | Floats
 
@@ -41,7 +41,7 @@ def one_each(value: Value, runs: int, place: str) -> list[float | str]:
 
 def quantity(given: float | str, unit: str, place: str) -> float:
     """Return SI; a text without a unit is refused where a person reads another one."""
-    return parse_quantity(given, unit, place, shown_unit(unit))
+    return parse_quantity(given, unit, place, display_unit(unit))
 
 
 def positive_seconds(given: float | str, place: str) -> float:

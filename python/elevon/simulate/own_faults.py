@@ -53,7 +53,7 @@ def own_faults(actuator: Actuator) -> list[FaultRecord]:
     return records
 
 
-def shown_drives(actuator: Actuator) -> tuple[str, ...]:
+def drive_kinds(actuator: Actuator) -> tuple[str, ...]:
     """Return the drives that an actuator can choose between; one without a name if none."""
     record = records(actuator.wiring).get(DRIVE)
     return (record.choices if record else None) or ("",)
@@ -69,7 +69,7 @@ def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
     record : FaultRecord
         One of its own (`own_faults`).
     """
-    cells = itertools.product(record.places, shown_drives(actuator))
+    cells = itertools.product(record.places, drive_kinds(actuator))
     places = []
     for place, drive in cells:
         vector = _with_drive(actuator, drive)

@@ -151,7 +151,7 @@ def si_unit(unit_text: str) -> str:
     return " ".join(f"{name}{power if power != 1 else ''}" for name, power in symbols if power)
 
 
-def shown_unit(unit: str) -> str:
+def display_unit(unit: str) -> str:
     """Return the unit in which a person reads an SI quantity: ``"deg"`` for ``"rad"``."""
     return DISPLAY.get(unit, unit)
 

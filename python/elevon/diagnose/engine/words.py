@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elevon.number_text import severity_texts
-from elevon.units import shown_unit, to_display
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -41,8 +41,8 @@ UNEXPLAINED = "does not explain"  # of the finding that the named faults leave a
 
 def severity_text(value: float, unit: str) -> str:
     """Return a severity for display: angles in degrees, lengths in mm, shares in %."""
-    display_unit = "%" if unit == "1" else shown_unit(unit)
-    return f"{float(to_display(value, display_unit)):.3g} {display_unit}"
+    display = "%" if unit == "1" else display_unit(unit)
+    return f"{float(to_display(value, display)):.3g} {display}"
 
 
 def by_reason(items: Sequence[Mapping[str, str]]) -> list[tuple[str, str]]:

@@ -17,7 +17,7 @@ from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
 from elevon.diagnose.roles.load import OverStroke, load_alike
 from elevon.diagnose.roles.numbers import Numbers, numbers_of
 from elevon.diagnose.roles.series import averaged, noise_deviation
-from elevon.experiment import Experiment, Inputs, Variant, shown_by
+from elevon.experiment import Experiment, Inputs, Variant, signals_by_role
 from elevon.logs.log import Log, on_clock
 from elevon.parameters.records import wirings
 from elevon.simulate.prepare import solver_step
@@ -175,7 +175,7 @@ class RoleReading(Reading):
 
     def _channels(self, units: Sequence[ReplayUnit]) -> Iterator[dict[str, Floats]]:
         """What each unit shows by the log's roles, on its instants."""
-        known = shown_by(self.actuator.wiring, "low")
+        known = signals_by_role(self.actuator.wiring, "low")
         signals = {role: known[role] for role in self.seen if role in known}
         over = _over(self.rate, solver_step(self.actuator, "low"))
         experiment = Experiment(
