@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from elevon.deploy import export_fmu as export_fmu
     from elevon.diagnose.door import diagnose as diagnose
     from elevon.diagnose.door import monitor as monitor
+    from elevon.diagnose.learning.door import learn_spread as learn_spread
     from elevon.doors import bench as bench
     from elevon.doors import compare as compare
     from elevon.doors import effects as effects
@@ -54,6 +55,7 @@ _PUBLIC = {
     "effects": "elevon.doors",
     "export_fmu": "elevon.deploy",
     "fleet": "elevon.prognose.door",
+    "learn_spread": "elevon.diagnose.learning.door",
     "monitor": "elevon.diagnose.door",
     "next_test": "elevon.nexttest.door",
     "next_inspection": "elevon.prognose.door",

@@ -81,6 +81,8 @@ ANSWERS = {
                         r"(Inspect (now|within)|No end of life)", (), True),
     "fleet": (("history", *ROTARY, "--mission", "mission.toml"), r"visit\(s\) for 1 units", (),
               True),
+    "learn-spread": (("log/log.csv", "base/log.csv", *ROTARY, "--out", "spread.toml"),
+                     r"^spread learnt: 2 days of 1 unit, 2 logs -> spread\.toml$", LOGS, True),
     "diagnose-train": (("--out", "own.npz", "--units", "8", "--low-units", "8", "--rounds", "50",
                         "--test-units", "2"), r"^trained: own\.npz", (), True),
     "live": (("--fidelity", "low", "--static", "page"), r"^7 files in page$", (), True),

@@ -198,6 +198,8 @@ RECIPES = {
     "fleet": Recipe(("history", "other", *ROTARY, "--mission", "mission.toml", "--report",
                      "fleet.html", "--force"), {"history": "@history", "other": "@history"},
                     long=True, points=8, code=(0, 1)),
+    "learn-spread": _analysis("log/log.csv", "base/log.csv", *ROTARY, "--out", "spread.toml",
+                              "--force", logs=("log", "base"), long=True, points=4),
     "diagnose-train": Recipe(("--out", "own.npz", "--units", "8", "--low-units", "2", "--rounds",
                               "10", "--test-units", "1", "--runs", "runs", "--force"), long=True,
                              points=2, code=(0, 1)),

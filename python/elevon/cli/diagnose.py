@@ -39,6 +39,10 @@ def diagnose(
         Path | None,
         typer.Option(help="Surrogate by elevon diagnose-train; default: the package's own."),
     ] = None,
+    spread: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Spread by elevon learn-spread; default: the stated."),
+    ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
@@ -69,7 +73,7 @@ def diagnose(
     result = run(
         common.read_logs(logs, column_map, loadcell, command), model,
         common.read_logs(baseline or [], column_map), method=method,
-        surrogate=surrogate, faults=fault, false_alarm=false_alarm,
+        surrogate=surrogate, faults=fault, false_alarm=false_alarm, spread=spread,
     )  # fmt: skip
     code = 0 if inspection is None else _append(inspection, result)
     return Answer(result, lambda: _print(result), code, page=result.report)

@@ -45,6 +45,7 @@ _HELP = {
     "monitor": "Watch a unit's stream; alarm when a fault begins.",
     "predict": "Say how long a unit will do what it must.",
     "next-inspection": "Say when to look at a unit again, and with which test.",
+    "learn-spread": "Learn from healthy logs how days and units differ.",
     "diagnose-train": "Train the surrogate that diagnose --method surrogate asks.",
     "fleet": "Group the maintenance of several units.",
     "next-test": "Propose the test that tells most about what is ambiguous.",

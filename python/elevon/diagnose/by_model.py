@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.engine.answer import Diagnosis
     from elevon.diagnose.engine.reading import Reading
+    from elevon.diagnose.engine.spread import LearnedSpread
     from elevon.logs.log import Log
 
 
@@ -45,6 +46,7 @@ def diagnose(
     baselines: Sequence[Log] = (),
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
+    spread: LearnedSpread | None = None,
 ) -> Diagnosis:
     """Say what is wrong with the unit that wrote the logs: which fault or pair of faults.
 
@@ -60,6 +62,8 @@ def diagnose(
         ``KIND@PLACE`` of the candidates; default: all.
     false_alarm : float
         Rate at which a healthy unit may be called faulty.
+    spread : LearnedSpread, optional
+        Of healthy days and of the model's mismatch; default: what the package states.
 
     Raises
     ------
@@ -70,8 +74,10 @@ def diagnose(
     check_request(logs, false_alarm)
     candidates = chosen(faults, actuator)
     healthy = [reading_of(log, actuator) for log in baselines]
-    cases = [case_of(reading_of(log, actuator), candidates, healthy) for log in logs]
-    result = answer_of(cases, candidates, false_alarm)
+    cases = [case_of(reading_of(log, actuator), candidates, healthy, spread) for log in logs]
+    result = answer_of(cases, candidates, false_alarm, spread)
+    if spread is not None:
+        result = replace(result, findings=(*result.findings, spread.threshold_text(false_alarm)))
     blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
     return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
 

@@ -13,6 +13,7 @@ from elevon.calibrate.ways import turns
 from elevon.diagnose.by_model import diagnose as by_model
 from elevon.diagnose.by_model import traces_of
 from elevon.diagnose.engine.answer import Diagnosis
+from elevon.diagnose.engine.spread import LearnedSpread
 from elevon.diagnose.monitor.answer import Monitoring
 from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor
 from elevon.errors import InputError, unknown
@@ -37,6 +38,7 @@ def diagnose(
     surrogate: Surrogate | str | os.PathLike[str] | None = None,
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
+    spread: LearnedSpread | str | os.PathLike[str] | None = None,
 ) -> Diagnosis:
     """Say what is wrong with the unit that wrote the logs, where, how bad, how sure.
 
@@ -56,6 +58,8 @@ def diagnose(
         ``KIND@PLACE`` of the candidates; default: all.
     false_alarm : float
         Rate at which a healthy unit may be called faulty.
+    spread : LearnedSpread or path, optional
+        By `elevon.learn_spread`; default: what the package states. Serves ``model``.
 
     Raises
     ------
@@ -64,7 +68,7 @@ def diagnose(
         serve this actuator.
     """
     model = as_actuator(actuator)
-    run = _method(method, surrogate)
+    run = _method(method, surrogate, spread)
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
     if method != "model" and not turns(model):
@@ -81,15 +85,21 @@ def _healthy(baselines: LogsLike) -> list[Log]:
 
 
 def _method(
-    method: str, given: Surrogate | str | os.PathLike[str] | None
+    method: str,
+    given: Surrogate | str | os.PathLike[str] | None,
+    spread: LearnedSpread | str | os.PathLike[str] | None,
 ) -> Callable[..., Diagnosis]:
-    """Return what diagnoses; a surrogate's file is read before any log."""
+    """Return what diagnoses; files of a surrogate and of a spread are read before any log."""
     if method not in METHODS:
         raise unknown("method", method, METHODS, "--method")
     if method == "model":
         if given is not None:
             raise InputError("--surrogate: serves --method surrogate and both")
-        return by_model
+        if spread is not None and not isinstance(spread, LearnedSpread):
+            spread = LearnedSpread.load(spread)
+        return partial(by_model, spread=spread)
+    if spread is not None:
+        raise InputError("--spread: serves --method model")
     from elevon.diagnose.surrogate import (
         Surrogate,
         diagnose_by_both,

@@ -10,10 +10,11 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import SEEN, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
-from elevon.diagnose.engine.detection import Detector
+from elevon.diagnose.engine.detection import DRAWS, Detector
 from elevon.diagnose.engine.healthy import Elsewhere, Healthy, healthy
 from elevon.diagnose.engine.reading import Reading
 from elevon.diagnose.engine.replay import Replay, modelled, replay
+from elevon.diagnose.engine.spread import LearnedSpread
 from elevon.diagnose.engine.table import FeatureVector
 
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
@@ -81,13 +82,16 @@ class LogCase:
 
 
 def case_of(
-    item: Reading, candidates: Sequence[CandidateFault], baselines: Sequence[Reading]
+    item: Reading,
+    candidates: Sequence[CandidateFault],
+    baselines: Sequence[Reading],
+    spread: LearnedSpread | None = None,
 ) -> LogCase:
-    """Hold a log against the model and the baselines."""
+    """Hold a log against the model and the baselines, with the spread that was learnt, if any."""
     others = [b for b in baselines if not item.same(b)]
     item, same = item.matched([b for b in baselines if item.same(b)])
     model = replay(item, candidates, same)
-    references = [(b.name, b.features if item.repeats(b) else _transferred(b, model)) for b in same]
+    references = [(b.name, b.features if item.repeats(b) else transferred(b, model)) for b in same]
     names = [n for n in item.features.names if n in model.healthy.names]
     names = [n for n in names if all(n in e.names for _, e in references)]
     names = item.usable(names, same)
@@ -96,15 +100,16 @@ def case_of(
         elsewhere = [Elsewhere(b.features, modelled(b)) for b in others if item.pools(b)]
 
     def against(features: FeatureVector, logs: Sequence[FeatureVector]) -> LogCase:
-        return LogCase("", features.only(names), healthy(model, names, logs), model)
+        unit = healthy(model, names, logs, spread_known=spread)
+        return LogCase("", features.only(names), unit, model)
 
     sound, findings, misfit = _sound(references, candidates, against)
-    unit = healthy(model, names, sound, elsewhere)
+    unit = healthy(model, names, sound, elsewhere, spread)
     findings += item.notes(same)
     return LogCase(item.name, item.features.only(names), unit, model, tuple(findings), misfit)
 
 
-def _transferred(item: Reading, model: Replay) -> FeatureVector:
+def transferred(item: Reading, model: Replay) -> FeatureVector:
     """Return a baseline's features, moved by what the model says of the two logs' commands."""
     features, there, here = item.features, modelled(item), model.healthy
     values = features.values.copy()
@@ -130,9 +135,9 @@ def _sound(
     for k, (name, features) in enumerate(references):
         others = [e for j, (_, e) in enumerate(references) if j != k]
         alone = against(features, [])
-        chances = [_chance(alone, candidates)]
+        chances = [chance_of(alone, candidates)]
         if others:
-            chances.append(_chance(against(features, others), candidates))
+            chances.append(chance_of(against(features, others), candidates))
         if max(chances) >= SUSPECT:
             sound.append(features)
             continue
@@ -156,7 +161,8 @@ def farthest(case: LogCase) -> Reason:
     return Reason(case.unit.names[k], float(case.features.values[k]), float(limit))
 
 
-def _chance(case: LogCase, candidates: Sequence[CandidateFault]) -> float:
+def chance_of(case: LogCase, candidates: Sequence[CandidateFault]) -> float:
+    """Return how often a healthy unit deviates as much as this log."""
     residual, root, detector = detector_of([case], candidates)
     return detector.chance(float(detector.score((root @ residual)[None, :])[0]))
 
@@ -178,7 +184,18 @@ def detector_of(
         rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
         both += [False] * len(rows[-1])
     degrees = min(case.unit.degrees for case in cases)
-    return residual, root, Detector(np.vstack(rows), both, degrees, ANYWHERE)
+    draws = _drawn(cases) @ root.T if any(case.unit.learned for case in cases) else None
+    return residual, root, Detector(np.vstack(rows), both, degrees, ANYWHERE, draws)
+
+
+def _drawn(cases: Sequence[LogCase]) -> Floats:
+    """Draws of healthy logs' deviations, with what is not known of their spread."""
+    rng = np.random.default_rng(15)
+    parts = []
+    for case in cases:
+        noise = rng.standard_normal((DRAWS, len(case.unit.names))) * case.features.std
+        parts.append(case.unit.drawn(DRAWS, rng) + noise)
+    return np.hstack(parts)
 
 
 def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:

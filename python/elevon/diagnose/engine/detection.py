@@ -12,7 +12,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 
-_DRAWS = 20_000
+DRAWS = 20_000
 
 
 class Detector:
@@ -28,20 +28,24 @@ class Detector:
         Of freedom of Student's distribution.
     anywhere : float
         Share of the false-alarm rate for deviations in any direction.
+    draws : ndarray, shape (d, k), optional
+        Whitened healthy logs; by default they follow Student's distribution.
     """
 
     def __init__(
-        self, directions: Floats, both: Sequence[bool], degrees: float, anywhere: float = 0.0
+        self,
+        directions: Floats,
+        both: Sequence[bool],
+        degrees: float,
+        anywhere: float = 0.0,
+        draws: Floats | None = None,
     ) -> None:
         size = np.linalg.norm(directions, axis=1)
         seen = size > 1e-9
         self._ways = directions[seen] / size[seen, None]
         self._both = np.array(both)[seen]
         self._degrees, self._anywhere = degrees, anywhere
-        rng = np.random.default_rng(15)
-        width = directions.shape[1]
-        chi = rng.chisquare(degrees, _DRAWS) / degrees
-        healthy = rng.standard_normal((_DRAWS, width)) / np.sqrt(chi)[:, None]
+        healthy = _student(directions.shape[1], degrees) if draws is None else draws
         self._ratios = np.sort(self.ratio(healthy))
         self._healthy = np.sort(self.score(healthy)) if anywhere else self._ratios
 
@@ -83,3 +87,10 @@ class Detector:
         """How often a healthy unit has this score or a larger one; at least one draw."""
         above = len(self._healthy) - int(np.searchsorted(self._healthy, score))
         return max(above, 1) / len(self._healthy)
+
+
+def _student(width: int, degrees: float) -> Floats:
+    """Draw whitened healthy logs of Student's distribution, shape (d, width)."""
+    rng = np.random.default_rng(15)
+    chi = rng.chisquare(degrees, DRAWS) / degrees
+    return np.asarray(rng.standard_normal((DRAWS, width)) / np.sqrt(chi)[:, None])

@@ -31,6 +31,7 @@ from elevon.diagnose.engine.explain import (
 )
 from elevon.diagnose.engine.likelihood import Hypothesis
 from elevon.diagnose.engine.posterior import Posterior, posterior
+from elevon.diagnose.engine.spread import LearnedSpread
 
 _ALL = 128  # pairs of faults that are all scored; of more the most promising of a faulty log
 _MOST = 16
@@ -43,6 +44,7 @@ def answer_of(
     cases: Sequence[LogCase],
     candidates: Sequence[CandidateFault],
     rate: float,
+    spread: LearnedSpread | None = None,
 ) -> Diagnosis:
     """Return the answer of logs that stand against their healthy unit.
 
@@ -54,6 +56,8 @@ def answer_of(
         Faults.
     rate : float
         Of false alarms.
+    spread : LearnedSpread, optional
+        That the cases stand on.
     """
     begin = clock.perf_counter()
     residual, root, detector = detector_of(cases, candidates)
@@ -61,7 +65,11 @@ def answer_of(
     blind, least = limits(cases, candidates, root)
     # What the logs cannot show would keep its prior, whatever they say: it is left out.
     seen = [c for c in candidates if c.key in least] or candidates
+    chance = detector.chance(score)
     faulty = score > detector.threshold(rate)
+    if spread is not None and len(cases) == 1:
+        chance = spread.chance(chance, cases[0].unit.baselines, rate)
+        faulty = chance <= rate
     few = len(seen) * (len(seen) - 1) // 2 <= _ALL
     result = _posterior_of(cases, seen, pairs=faulty or few, most=None if few else _MOST)
     best = _best(result, faulty=faulty)
@@ -75,7 +83,7 @@ def answer_of(
         status=status,
         p_fault=result.faulty,
         false_alarm=rate,
-        chance=detector.chance(score),
+        chance=chance,
         faults=causes(result, cases, seen, best.keys) if clear else (),
         best=keys,
         p_best=_probability(result, best, faulty=faulty) if clear else result.other,

@@ -9,10 +9,10 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.replay import Replay
+from elevon.diagnose.engine.spread import LearnedSpread
 from elevon.diagnose.engine.table import Feature, FeatureVector, deviations
 
 _FAR = 2.0  # deviations
-DEGREES = 10.0  # ASSUMED: worth of the stated spread, in runs
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,10 @@ class Healthy:
     offset : ndarray, shape (k, k)
         The part of the covariance that is the same in all logs of the unit: what is not known of
         how far it deviates from the model.
+    worth, offset_worth : ndarray, shape (k,)
+        Runs that the spread and the offset are known by.
+    learned : bool
+        Whether they were learnt.
     """
 
     names: tuple[str, ...]
@@ -45,6 +49,20 @@ class Healthy:
     baselines: int
     scale: Floats
     offset: Floats
+    worth: Floats
+    offset_worth: Floats
+    learned: bool = False
+
+    def drawn(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draw a new log's deviations, shape (count, k), with what is not known of their sizes."""
+        out = np.zeros((count, len(self.mean)))
+        parts = ((self.covariance - self.offset, self.worth), (self.offset, self.offset_worth))
+        for covariance, worth in parts:
+            # The offset may be known to the last digit: what is left of it is no matrix to factor.
+            values, ways = np.linalg.eigh(covariance)
+            steps = rng.standard_normal(out.shape) * np.sqrt(np.maximum(values, 0.0))
+            out += steps @ ways.T / np.sqrt(rng.chisquare(worth, out.shape) / worth)
+        return out
 
 
 @dataclass(frozen=True)
@@ -60,14 +78,15 @@ def healthy(
     names: Sequence[str],
     baselines: Sequence[FeatureVector],
     elsewhere: Sequence[Elsewhere] = (),
+    spread_known: LearnedSpread | None = None,
 ) -> Healthy:
     """Join the model's spread with baselines.
 
     The offset of a unit from the model is Gaussian with each feature's mismatch; the mean of the
     baselines of the same test narrows it (or replaces it, where the model's mean is no prior),
     those of other tests narrow what is pooled. The spread's
-    scale is that stated, worth `DEGREES` runs, and the baselines' scatter. Where baselines deviate
-    further from the model than was assumed, the assumption yields.
+    scale is that stated, worth `DEGREES` runs, or learnt, and the baselines' scatter. Where
+    baselines deviate further from the model than was assumed, the assumption yields.
     """
     at, count = model.places(names), len(baselines)
     records = [model.table[name] for name in names]
@@ -76,30 +95,39 @@ def healthy(
         common_error = model.common_error[at]
     values = np.array([b.only(names).values for b in baselines]).reshape(count, len(at))
     level = values.mean(axis=0) if count else mean
+    known = (spread_known or LearnedSpread()).of(names)
     spread = model.spread[np.ix_(at, at)] + np.diag(deviations(records, level, "repeats") ** 2)
+    spread *= np.sqrt(np.outer(known.days, known.days))
     off = np.diag(deviations(records, level, "mismatch") ** 2) + np.outer(
         common_error, common_error
     )
-    scale = np.ones(len(at))
+    off *= np.sqrt(np.outer(known.mismatch, known.mismatch))
+    scale, worth, offset_worth = np.ones(len(at)), known.worth, known.mismatch_worth
     left, moved = off, np.zeros(len(at))
     if count:
         residual = values - mean
         noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
         centre = residual.mean(axis=0)
         scatter = np.sum((residual - centre) ** 2, axis=0) / (np.diag(spread) + noise)
-        scale = (DEGREES + scatter) / (DEGREES + count - 1)
+        scale = (worth + scatter) / (worth + count - 1)
+        worth = worth + count - 1
         spread *= np.sqrt(np.outer(scale, scale))
         of_mean = (spread + np.diag(noise)) / count
         off = _yielding(off, of_mean, centre)
         gain = off @ np.linalg.inv(off + of_mean)
         left, moved = (off - gain @ off, gain @ centre) if model.prior else (of_mean, centre)
+        # What baselines leave of the offset is their own scatter, as little known as the spread.
+        offset_worth = np.where(np.diag(of_mean) < np.diag(off), worth, offset_worth)
     for k, offset, std in _pooled(records, mean, elsewhere):
         gain = left[:, k] / (left[k, k] + spread[k, k] + std**2)
         moved = moved + gain * (offset - moved[k])
         left = left - np.outer(gain, left[k])
     left = 0.5 * (left + left.T)
     degrees = model.degrees + max(count - 1, 0)
-    return Healthy(tuple(names), mean + moved, spread + left, degrees, count, np.sqrt(scale), left)
+    return Healthy(
+        tuple(names), mean + moved, spread + left, degrees, count, np.sqrt(scale), left, worth,
+        offset_worth, spread_known is not None,
+    )  # fmt: skip
 
 
 def _yielding(off: Floats, of_mean: Floats, centre: Floats) -> Floats:

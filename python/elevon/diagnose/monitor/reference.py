@@ -11,8 +11,9 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase
-from elevon.diagnose.engine.healthy import DEGREES, healthy
+from elevon.diagnose.engine.healthy import healthy
 from elevon.diagnose.engine.replay import replay
+from elevon.diagnose.engine.spread import DEGREES
 from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.monitor.filter import WindowSpread
 from elevon.diagnose.monitor.windows import stretch, window_features, windows_of

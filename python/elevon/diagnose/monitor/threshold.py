@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.healthy import DEGREES
+from elevon.diagnose.engine.spread import DEGREES
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 
 STREAMS = 2000

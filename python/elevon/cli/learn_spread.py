@@ -1,0 +1,62 @@
+"""`elevon learn-spread`: what differs from day to day of healthy units, from their logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elevon.cli import common
+from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.shell import Answer, command
+
+if TYPE_CHECKING:
+    from elevon.diagnose.engine.spread import LearnedSpread
+
+app = typer.Typer(rich_markup_mode=None)
+_RATE = 0.05  # of false alarms, by default
+
+
+@command(app, "strict")
+def learn_spread(
+    logs: common.LogsArgument,
+    *,
+    actuator: common.ActuatorOption,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Spread to write (.toml).")],
+    units: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Table (CSV): log, unit, day. Default: a log a day."),
+    ] = None,
+    loadcell: common.LoadcellOption = None,
+    command: common.CommandOption = None,
+    column_map: common.MapOption = None,
+    settings: common.SetOption = None,
+    force: common.ForceOption = False,
+) -> Answer:
+    """Learn spread and model mismatch from healthy logs of one unit, or of several."""
+    from elevon.diagnose.learning.log_table import log_table, looked_up
+    from elevon.diagnose.learning.spread import learned_spread
+
+    common.check_outputs([out], force=force)
+    model = common.read_actuator(actuator, settings)
+    logs = common.without_companions(logs)
+    rows = None if units is None else looked_up(log_table(units, ("unit", "day")), logs, units)
+    days = None if rows is None else [(row["unit"], row["day"]) for row in rows]
+    data = common.read_logs(logs, column_map, loadcell, command)
+    with progress_bar("learning the spread") as advance:
+        result = learned_spread(data, model, days, advance)
+    path = result.save(out, force=force)
+    return Answer({"file": str(path), **result.to_dict()}, lambda: _print(result, path))
+
+
+def _print(result: LearnedSpread, path: Path) -> None:
+    of = f"{result.days} days of {result.units} unit{'s' * (result.units > 1)}"
+    answer(f"spread learnt: {of}, {result.logs} logs -> {path}")
+    far = sorted(result.features.items(), key=lambda row: -abs(row[1].days.value - 1.0))
+    rows = [
+        (name, *(f"{x:.2f}" for x in (*row.days.root(), *row.mismatch.root()))) for name, row in far
+    ]
+    columns = ("feature", "day to day", "low", "high", "mismatch", "low", "high")
+    print_table(columns, rows, title="deviations over those stated, with 90 % intervals")
+    answer(result.threshold_text(_RATE))

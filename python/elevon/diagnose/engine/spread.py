@@ -1,0 +1,187 @@
+"""Spread from day to day and mismatch of model and machine: what is known of them, and the file.
+
+Each is a factor of a variance that the package states: scaled inverse chi-square, worth so many
+runs. A threshold by draws includes what is not known of it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.documents import Document, read_toml
+from elevon.errors import FormatError
+from elevon.files import write_text
+
+DEGREES = 10.0  # ASSUMED: worth of the stated spread, and of the stated mismatch, in runs
+FORMAT = "elevon-spread"
+_VERSION = 1
+_ENDS = (0.05, 0.95)
+
+
+class Factor(NamedTuple):
+    """A variance over the stated one, and in how many runs it is worth that."""
+
+    value: float = 1.0
+    degrees: float = DEGREES
+
+    def interval(self) -> tuple[float, float]:
+        """Return the ends of its 90 % interval."""
+        from scipy.stats import chi2
+
+        high, low = (self.value * self.degrees / float(chi2.ppf(q, self.degrees)) for q in _ENDS)
+        return low, high
+
+    def root(self) -> tuple[float, float, float]:
+        """Return the factor of the deviation, with the ends of its 90 % interval."""
+        low, high = self.interval()
+        return math.sqrt(self.value), math.sqrt(low), math.sqrt(high)
+
+
+class FeatureSpread(NamedTuple):
+    """What is known of one feature: its spread from day to day, and the model's mismatch."""
+
+    days: Factor = Factor()
+    mismatch: Factor = Factor()
+
+
+class Known(NamedTuple):
+    """Factors of features, shape (k,) each: of the spread, of the mismatch, with their worth."""
+
+    days: Floats
+    worth: Floats
+    mismatch: Floats
+    mismatch_worth: Floats
+
+
+@dataclass(frozen=True)
+class LearnedSpread:
+    """Spread of healthy units, learnt from their logs.
+
+    Attributes
+    ----------
+    actuator : str
+        Name of the actuator file that the logs were held against.
+    logs, units, days : int
+        Learnt from; a unit's days are counted apart from another's.
+    features : mapping of str to FeatureSpread
+        By name; the stated ones hold where a feature is missing.
+    alone, based : tuple of float
+        Chance that draws give each learnt log, held out by its day: without a baseline, and with
+        one of another day.
+    """
+
+    actuator: str = ""
+    logs: int = 0
+    units: int = 0
+    days: int = 0
+    features: Mapping[str, FeatureSpread] = field(default_factory=dict)
+    alone: tuple[float, ...] = ()
+    based: tuple[float, ...] = ()
+
+    def of(self, names: Sequence[str]) -> Known:
+        """Return what is known of features."""
+        rows = [self.features.get(name, FeatureSpread()) for name in names]
+        table = np.array([[*r.days, *r.mismatch] for r in rows], dtype=np.float64).reshape(-1, 4)
+        return Known(*table.T)
+
+    def enough(self, rate: float) -> bool:
+        """Whether a conformal threshold reaches a rate of false alarms."""
+        return self.days >= needed(rate)
+
+    def chance(self, chance: float, baselines: int, rate: float) -> float:
+        """Return how often a healthy log has such a chance: conformal, where that reaches a rate.
+
+        The rank among the held-out healthy logs (Vovk, Gammerman and Shafer, 2005, chapter 2);
+        it holds for a day that is exchangeable with theirs, whatever the features' distribution.
+        """
+        scores = self.based if baselines else self.alone
+        if not scores or not self.enough(rate):
+            return chance
+        return (1.0 + sum(c <= chance for c in scores)) / (len(scores) + 1.0)
+
+    def threshold_text(self, rate: float) -> str:
+        """Say what a threshold stands on."""
+        how = "conformal" if self.enough(rate) else "by draws of what is not known of the spread"
+        return (
+            f"threshold {how}: {self.days} healthy days were learnt, a conformal one at "
+            f"{100.0 * rate:g} % needs {needed(rate)}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain types."""
+        rows = {
+            name: {
+                "days": row.days.value, "days_worth": row.days.degrees,
+                "mismatch": row.mismatch.value, "mismatch_worth": row.mismatch.degrees,
+            }
+            for name, row in self.features.items()
+        }  # fmt: skip
+        return {
+            "format": FORMAT, "version": _VERSION, "actuator": self.actuator, "logs": self.logs,
+            "units": self.units, "days": self.days, "alone": list(self.alone),
+            "based": list(self.based), "features": rows,
+        }  # fmt: skip
+
+    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+        """Write it as TOML.
+
+        Raises
+        ------
+        OutputExistsError
+            The file is there, and not `force`.
+        """
+        data = self.to_dict()
+        rows = data.pop("features")
+        lines = ["# Variances over those that the package states, and their worth in runs."]
+        lines += [f"{name} = {json.dumps(value)}" for name, value in data.items()]
+        for name, row in rows.items():
+            values = ", ".join(f"{key} = {value!r}" for key, value in row.items())
+            lines.append(f"features.{json.dumps(name)} = {{ {values} }}")
+        return write_text(path, "\n".join(lines) + "\n", force=force)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> LearnedSpread:
+        """Read a file that `save` wrote.
+
+        Raises
+        ------
+        FormatError
+            Another file, or a value that is none of a spread.
+        """
+        document = read_toml(Path(path))
+        data = dict(document.data)
+        if data.pop("format", None) != FORMAT or data.pop("version", None) != _VERSION:
+            raise FormatError(f"{path}: no file of elevon learn-spread (format = {FORMAT!r})")
+        try:
+            rows = data.pop("features", {})
+            features = {name: _row(document, name, row) for name, row in rows.items()}
+            scores = {name: tuple(map(float, data.pop(name))) for name in ("alone", "based")}
+            return cls(features=features, **scores, **data)
+        except (TypeError, AttributeError, KeyError, ValueError) as error:
+            raise FormatError(f"{path}: a key is missing or of another kind: {error}") from None
+
+
+def needed(rate: float) -> int:
+    """Return how many healthy days a conformal threshold needs: the least n of 1/(n + 1) <= rate.
+
+    >>> needed(0.05), needed(0.01)
+    (19, 99)
+    """
+    return max(math.ceil(1.0 / rate - 1e-9) - 1, 1)
+
+
+def _row(document: Document, name: str, row: Mapping[str, float]) -> FeatureSpread:
+    values = [float(row[k]) for k in ("days", "days_worth", "mismatch", "mismatch_worth")]
+    if len(row) != 4 or not all(math.isfinite(v) and v > 0.0 for v in values):
+        place = document.place(("features", name))
+        raise FormatError(f"{place}: days, mismatch and their worth must be above zero, not {row}")
+    return FeatureSpread(Factor(*values[:2]), Factor(*values[2:]))
