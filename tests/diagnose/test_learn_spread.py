@@ -52,11 +52,11 @@ def test_one_days_logs_say_nothing_of_days():
 def test_the_prior_of_the_mismatch_is_kept_where_the_log_says_nothing():
     """A unit whose offset has the stated size leaves its middle where it was."""
     rows = fleet(1, 2)[0]
-    still = TestResiduals(
+    alike = TestResiduals(
         ("x",), rows.unit, rows.day, np.full((2, 1), math.sqrt(MISMATCH)), rows.noise,
         np.array([1e-9]), rows.mismatch,
     )  # fmt: skip
-    value, degrees = fitted([still])["x"].mismatch
+    value, degrees = fitted([alike])["x"].mismatch
     assert value == pytest.approx(1.0, rel=0.02)
     assert degrees == pytest.approx(DEGREES + 1.0, rel=0.02)
 
@@ -72,15 +72,15 @@ def test_many_days_and_units_are_believed():
 def test_intervals_hold_the_true_spread():
     """Of a spread drawn from the prior, nine tenths of the 90 % intervals hold it."""
     rng = np.random.default_rng(8)
-    held = [0, 0]
+    inside = [0, 0]
     for _ in range(200):
         v, q = (DEGREES / rng.chisquare(DEGREES) for _ in range(2))
         row = fitted(fleet(1, 6, spread=v, mismatch=q, rng=rng))["x"]
         for k, (factor, true) in enumerate(((row.days, v), (row.mismatch, q))):
             low, high = factor.interval()
-            held[k] += low < true < high
-    assert 170 <= held[0] <= 191  # 180 +- 2.5 deviations of a count
-    assert 170 <= held[1] <= 191
+            inside[k] += low < true < high
+    assert 170 <= inside[0] <= 191  # 180 +- 2.5 deviations of a count
+    assert 170 <= inside[1] <= 191
 
 
 def test_tests_of_one_unit_count_once():

@@ -147,12 +147,12 @@ def _groups(items: Sequence[Reading]) -> list[list[tuple[int, Reading]]]:
 def _test(
     members: Sequence[tuple[Reading, tuple[str, str]]], candidates: Sequence[CandidateFault]
 ) -> _Test:
-    first, rest = members[0][0].matched([item for item, _ in members[1:]])
-    items = (first, *rest)
+    first, later = members[0][0].matched([item for item, _ in members[1:]])
+    items = (first, *later)
     models = tuple(replay(item, candidates, [first]) for item in items)
-    shown = [*(set(i.features.names) for i in items), *(set(m.healthy.names) for m in models)]
-    names = [n for n in first.features.names if all(n in s for s in shown)]
-    names = first.usable(names, rest)
+    sets = [*(set(i.features.names) for i in items), *(set(m.healthy.names) for m in models)]
+    names = [n for n in first.features.names if all(n in s for s in sets)]
+    names = first.usable(names, later)
     at = models[0].places(names)
     off, noise = [], []
     for item, model in zip(items, models, strict=True):
