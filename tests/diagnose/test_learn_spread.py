@@ -11,7 +11,13 @@ from elevon import Actuator
 from elevon.diagnose.engine.case import LogCase, chance_of
 from elevon.diagnose.engine.healthy import healthy
 from elevon.diagnose.engine.replay import Replay
-from elevon.diagnose.engine.spread import DEGREES, Factor, FeatureSpread, LearnedSpread, needed
+from elevon.diagnose.engine.spread import (
+    DEGREES,
+    FeatureSpread,
+    LearnedSpread,
+    VarianceFactor,
+    needed,
+)
 from elevon.diagnose.engine.table import Feature, FeatureVector
 from elevon.diagnose.learning.log_table import log_table, looked_up
 from elevon.diagnose.learning.spread import TestResiduals, fitted
@@ -42,11 +48,11 @@ def fleet(units, days, *, spread=1.0, mismatch=1.0, logs=1, tests=1, rng=None):
 def test_without_logs_the_stated_spread_stands():
     assert LearnedSpread().of(["x"]) == pytest.approx((1.0, DEGREES, 1.0, DEGREES))
     one = fitted(fleet(1, 1))["x"]
-    assert one.days == Factor(1.0, DEGREES)  # one day says nothing of days
+    assert one.days == VarianceFactor(1.0, DEGREES)  # one day says nothing of days
 
 
 def test_one_days_logs_say_nothing_of_days():
-    assert fitted(fleet(1, 1, logs=50))["x"].days == Factor(1.0, DEGREES)
+    assert fitted(fleet(1, 1, logs=50))["x"].days == VarianceFactor(1.0, DEGREES)
 
 
 def test_the_prior_of_the_mismatch_is_kept_where_the_log_says_nothing():
@@ -111,7 +117,12 @@ def test_a_conformal_threshold_needs_its_days():
 
 def test_the_file_comes_back(tmp_path):
     learnt = LearnedSpread(
-        "unit", 3, 1, 3, {"a: b": FeatureSpread(Factor(2.5, 12.0), Factor(0.3, 11.5))}, (0.1, 0.2)
+        "unit",
+        3,
+        1,
+        3,
+        {"a: b": FeatureSpread(VarianceFactor(2.5, 12.0), VarianceFactor(0.3, 11.5))},
+        (0.1, 0.2),
     )
     assert LearnedSpread.load(learnt.save(tmp_path / "s.toml")) == learnt
     text = (tmp_path / "s.toml").read_text()

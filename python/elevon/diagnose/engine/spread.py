@@ -27,7 +27,7 @@ _VERSION = 1
 _ENDS = (0.05, 0.95)
 
 
-class Factor(NamedTuple):
+class VarianceFactor(NamedTuple):
     """A variance over the stated one, and in how many runs it is worth that."""
 
     value: float = 1.0
@@ -49,11 +49,11 @@ class Factor(NamedTuple):
 class FeatureSpread(NamedTuple):
     """What is known of one feature: its spread from day to day, and the model's mismatch."""
 
-    days: Factor = Factor()
-    mismatch: Factor = Factor()
+    days: VarianceFactor = VarianceFactor()
+    mismatch: VarianceFactor = VarianceFactor()
 
 
-class Known(NamedTuple):
+class KnownSpread(NamedTuple):
     """Factors of features, shape (k,) each: of the spread, of the mismatch, with their worth."""
 
     days: Floats
@@ -87,11 +87,11 @@ class LearnedSpread:
     alone: tuple[float, ...] = ()
     based: tuple[float, ...] = ()
 
-    def of(self, names: Sequence[str]) -> Known:
+    def of(self, names: Sequence[str]) -> KnownSpread:
         """Return what is known of features."""
         rows = [self.features.get(name, FeatureSpread()) for name in names]
         table = np.array([[*r.days, *r.mismatch] for r in rows], dtype=np.float64).reshape(-1, 4)
-        return Known(*table.T)
+        return KnownSpread(*table.T)
 
     def enough(self, rate: float) -> bool:
         """Whether a conformal threshold reaches a rate of false alarms."""
@@ -184,4 +184,4 @@ def _row(document: Document, name: str, row: Mapping[str, float]) -> FeatureSpre
     if len(row) != 4 or not all(math.isfinite(v) and v > 0.0 for v in values):
         place = document.place(("features", name))
         raise FormatError(f"{place}: days, mismatch and their worth must be above zero, not {row}")
-    return FeatureSpread(Factor(*values[:2]), Factor(*values[2:]))
+    return FeatureSpread(VarianceFactor(*values[:2]), VarianceFactor(*values[2:]))

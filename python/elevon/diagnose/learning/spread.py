@@ -21,7 +21,7 @@ from elevon.diagnose.engine.candidates import CandidateFault, candidates_of
 from elevon.diagnose.engine.case import LogCase, chance_of, transferred
 from elevon.diagnose.engine.healthy import healthy
 from elevon.diagnose.engine.replay import Replay, replay
-from elevon.diagnose.engine.spread import DEGREES, Factor, FeatureSpread, LearnedSpread
+from elevon.diagnose.engine.spread import DEGREES, FeatureSpread, LearnedSpread, VarianceFactor
 from elevon.diagnose.engine.table import FeatureVector, deviations
 from elevon.errors import InputError, Interrupted
 from elevon.progress import Progress
@@ -217,7 +217,7 @@ def _scatter(columns: Iterable[TestResiduals], unit: str) -> tuple[float, float]
     return (float(np.mean(ratios)), max(degrees)) if ratios else None
 
 
-def _days(scatter: Sequence[tuple[float, float]]) -> Factor:
+def _days(scatter: Sequence[tuple[float, float]]) -> VarianceFactor:
     """The factor of a step's variance, by what units scatter.
 
     Of several units it is worth less for the next one where theirs differ.
@@ -227,7 +227,7 @@ def _days(scatter: Sequence[tuple[float, float]]) -> Factor:
     worth = DEGREES + total
     if len(scatter) > 1:
         worth = 1.0 / (1.0 / worth + 1.0 / _between(scatter, value))
-    return Factor(value, max(worth, 1.0))
+    return VarianceFactor(value, max(worth, 1.0))
 
 
 def _between(scatter: Sequence[tuple[float, float]], value: float) -> float:
@@ -241,7 +241,9 @@ def _between(scatter: Sequence[tuple[float, float]], value: float) -> float:
     return float(weight.sum() / np.sum(weight / _WORTH))
 
 
-def _mismatch(columns: Sequence[TestResiduals], units: Sequence[str], daily: float) -> Factor:
+def _mismatch(
+    columns: Sequence[TestResiduals], units: Sequence[str], daily: float
+) -> VarianceFactor:
     """The factor of an offset's variance; tests of one unit share it, so they count once."""
     log = -(0.5 * DEGREES) * (np.log(_GRID) + 1.0 / _GRID)
     for unit in units:
@@ -254,7 +256,7 @@ def _mismatch(columns: Sequence[TestResiduals], units: Sequence[str], daily: flo
     weight /= weight.sum()
     mean = float(np.sum(weight / _GRID))
     variance = float(np.sum(weight * (1.0 / _GRID - mean) ** 2))
-    return Factor(1.0 / mean, 2.0 * mean**2 / variance)
+    return VarianceFactor(1.0 / mean, 2.0 * mean**2 / variance)
 
 
 def _centre(c: TestResiduals, unit: str, daily: float) -> tuple[float, float, float]:
