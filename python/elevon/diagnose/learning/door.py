@@ -70,8 +70,8 @@ def listed(logs: LogsLike) -> list[Log | str | os.PathLike[str]]:
 def read(items: Sequence[Log | str | os.PathLike[str]]) -> list[Log]:
     """Return logs, read where they are files; days may bear one name, and have other rates."""
     paths = [Path(item) for item in items if not isinstance(item, Log)]
-    found = iter(read_logs(paths, one_rate=False) if paths else ())
-    return [item if isinstance(item, Log) else next(found) for item in items]
+    imported = iter(read_logs(paths, one_rate=False) if paths else ())
+    return [item if isinstance(item, Log) else next(imported) for item in items]
 
 
 def names_of(items: Sequence[Log | str | os.PathLike[str]]) -> list[str | Path]:

@@ -73,16 +73,16 @@ def looked_up(
     out, used = [], set()
     for log in logs:
         parts = Path(log).parts
-        found = [
+        lines = [
             name
             for name in table
             if Path(name).parts == parts[len(parts) - len(Path(name).parts) :]
         ]
-        if len(found) != 1:
-            what = f"has {len(found)} lines for" if found else "has no line for"
+        if len(lines) != 1:
+            what = f"has {len(lines)} lines for" if lines else "has no line for"
             raise InputError(f"{place}: {what} {log}{did_you_mean(str(log), table)}")
-        used.add(found[0])
-        out.append(table[found[0]])
+        used.add(lines[0])
+        out.append(table[lines[0]])
     left = [name for name in table if name not in used]
     if left:
         raise InputError(f"{place}: {left[0]} is not among the logs that were given")
