@@ -139,6 +139,21 @@ def test_discriminant_knows_its_classes_and_its_doubts():
     assert fitted.outside([[50.0, 0.0]]).tolist() == [[True, False]]
 
 
+def test_scatter_is_friedmans_of_unequal_classes_and_a_feature_that_stands():
+    random = _random(5)
+    labels = np.repeat(["a", "b", "c"], [9, 4, 20])
+    x = random.standard_normal((33, 4)) @ np.diag([1.0, 50.0, 1e-3, 0.0]) + 2.0
+    x[:, 1] += x[:, 0]
+    fitted = Discriminant.fit(x, labels.tolist(), np.arange(33) % 3, shrinkage=0.3)
+    means = {name: x[labels == name].mean(axis=0) for name in "abc"}
+    residual = np.array([row - means[name] for row, name in zip(x, labels, strict=True)])
+    scale = np.array([*np.sqrt((residual[:, :3] ** 2).sum(axis=0) / 30.0), 2.0])
+    unit = residual / scale
+    scatter = 0.7 * unit.T @ unit / 30.0 + 0.3 * np.eye(4)
+    np.testing.assert_allclose(fitted.scale, scale, rtol=1e-12)
+    np.testing.assert_allclose(fitted.precision, np.linalg.inv(scatter), rtol=1e-9, atol=1e-12)
+
+
 def test_groups_that_shift_make_the_probabilities_humble():
     random = _random(2)
     labels = np.tile(np.repeat(["a", "b"], 20), 4)

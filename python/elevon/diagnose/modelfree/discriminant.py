@@ -1,8 +1,9 @@
 """A linear discriminant with shrunk scatter and probabilities calibrated on groups left out.
 
 Every class has a mean, all share one scatter (Fisher). The scatter is shrunk towards its diagonal
-(Friedman, "Regularized Discriminant Analysis", JASA 84(405), 1989), and the probabilities are
-flattened or sharpened by one temperature, both chosen on groups that the fit had not seen.
+(Friedman, "Regularized Discriminant Analysis", JASA 84(405), 1989; by scikit-learn), and the
+probabilities are flattened or sharpened by one temperature, both chosen on groups that the fit had
+not seen.
 """
 
 from __future__ import annotations
@@ -77,6 +78,8 @@ class Discriminant:
         ------
         InputError
             Fewer than two classes, lengths that differ, numbers that are not finite.
+        ModuleNotFoundError
+            scikit-learn is missing; it names the command that installs the extra.
         """
         x, y, g = _checked(values, labels, groups)
         candidates = SHRINKAGES if shrinkage is None else (shrinkage,)
@@ -124,16 +127,30 @@ def _fit(x: Floats, y: npt.NDArray[np.str_], shrinkage: float, temperature: floa
     classes = np.unique(y)
     means = np.array([x[y == name].mean(axis=0) for name in classes])
     residual = x - means[np.searchsorted(classes, y)]
-    freedom = max(1, len(x) - len(classes))
-    scale = np.sqrt((residual**2).sum(axis=0) / freedom)
+    scale = np.sqrt((residual**2).sum(axis=0) / max(1, len(x) - len(classes)))
+    varies = scale > 0.0
     # A feature that does not vary (one recording a class) must not divide by zero.
-    scale = np.where(scale > 0.0, scale, np.maximum(np.abs(means).max(axis=0), 1.0))
-    unit = residual / scale
-    scatter = (1.0 - shrinkage) * unit.T @ unit / freedom + shrinkage * np.eye(x.shape[1])
+    scale = np.where(varies, scale, np.maximum(np.abs(means).max(axis=0), 1.0))
+    scatter = shrinkage * np.eye(x.shape[1])
+    if varies.any():
+        scatter[np.ix_(varies, varies)] = _scatter(x[:, varies] / scale[varies], y, shrinkage)
     return Discriminant(
-        tuple(str(name) for name in classes), means / scale, scale, np.linalg.inv(scatter),
-        x.min(axis=0), x.max(axis=0), shrinkage, temperature,
+        tuple(str(name) for name in classes), means / scale, scale,
+        np.asarray(np.linalg.inv(scatter), dtype=np.float64), x.min(axis=0), x.max(axis=0),
+        shrinkage, temperature,
     )  # fmt: skip
+
+
+def _scatter(x: Floats, y: npt.NDArray[np.str_], shrinkage: float) -> Floats:
+    """Return the shrunk scatter about the classes' means, by degrees of freedom.
+
+    The features have a deviation of one each, so that the library shrinks to their diagonal.
+    """
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+
+    library = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=shrinkage).fit(x, y)
+    share = len(x) / (len(x) - len(library.classes_))  # it counts recordings
+    return np.asarray(share * library.covariance_, dtype=np.float64)
 
 
 def _left_out_loss(
