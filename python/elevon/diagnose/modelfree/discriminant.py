@@ -8,6 +8,7 @@ not seen.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -148,7 +149,11 @@ def _scatter(x: Floats, y: npt.NDArray[np.str_], shrinkage: float) -> Floats:
     """
     from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
-    library = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=shrinkage).fit(x, y)
+    library = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=shrinkage)
+    with warnings.catch_warnings():
+        # A class of one recording adds nothing to the scatter; that is no fault of the fit.
+        warnings.filterwarnings("ignore", "Only one sample available", UserWarning)
+        library.fit(x, y)
     share = len(x) / (len(x) - len(library.classes_))  # it counts recordings
     return np.asarray(share * library.covariance_, dtype=np.float64)
 
