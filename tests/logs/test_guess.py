@@ -142,3 +142,14 @@ def test_a_time_of_thousandths_is_no_ms_without_doubt(tmp_path, capsys, header, 
     column = answer["columns"][0]
     assert column["unit"] == unit
     assert any(message in reason for reason in column["reasons"]), column["reasons"]
+
+
+def test_a_command_that_steps_once_is_no_clock(tmp_path, capsys, motion):
+    """It rises throughout too, and a repeated clock is still one."""
+    path = tmp_path / "log.csv"
+    clock = np.floor(motion["t"] / 0.02) * 0.02
+    step = np.where(motion["t"] < 6.0, 0.0, 0.05)
+    rows = np.column_stack((step, clock, motion["position"], motion["speed"]))
+    np.savetxt(path, rows, delimiter=",", header="a,b,position [mm],speed [mm/s]", comments="")
+    answer, _ = guessed(tmp_path, capsys, path)
+    assert [item["name"] for item in answer["columns"] if item["role"] == "time"] == ["b"]

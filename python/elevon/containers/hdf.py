@@ -6,7 +6,7 @@ references, objects and foreign filters are never followed or loaded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -138,24 +138,40 @@ def vector(data: Any, kinds: str, check: Check) -> npt.NDArray[Any] | str:
     ndarray of shape (n,), or str
         The values, or why they are not read.
     """
-    reason = _refusal(data, kinds)
+    values = array(data, kinds, check, also=lambda _shape: False)
+    return values if isinstance(values, str) else values.reshape(-1)
+
+
+def array(
+    data: Any, kinds: str, check: Check, *, also: Callable[[Sequence[int]], bool]
+) -> npt.NDArray[Any] | str:
+    """Read a vector, or an array of a shape that `also` allows; the rest as of `vector`.
+
+    Returns
+    -------
+    ndarray of the stored shape, or str
+        The values, or why they are not read.
+    """
+    reason = _refusal(data, kinds, also)
     if reason:
         return reason
     if data.chunks is not None:
         check(int(np.prod(data.chunks)) * data.dtype.itemsize)
     check(int(data.size) * data.dtype.itemsize)
-    return np.asarray(data[()]).reshape(-1)
+    return np.asarray(data[()])
 
 
-def _refusal(data: Any, kinds: str) -> str:
-    """Why a dataset is not read; empty when it is a plain vector of a kind allowed."""
+def _refusal(data: Any, kinds: str, also: Callable[[Sequence[int]], bool]) -> str:
+    """Why a dataset is not read; empty when it is a plain array of a kind and size allowed."""
     if data.dtype.kind not in kinds:
         return "not numbers" if "f" in kinds else "not text"
     if data.attrs.get("MATLAB_object_decode") is not None:
         return "a MATLAB object"
     if data.is_virtual or data.external:
         return "its data lie outside the file"
-    if data.shape is None or sum(length > 1 for length in data.shape) > 1:
+    if data.shape is None or (
+        sum(length > 1 for length in data.shape) > 1 and not also(data.shape)
+    ):
         return f"not a vector: shape {data.shape}"
     plan = data.id.get_create_plist()
     codes = {plan.get_filter(k)[0] for k in range(plan.get_nfilters())}

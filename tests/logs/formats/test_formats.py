@@ -293,3 +293,18 @@ def test_the_real_cranfield_files(shared):
         )
     with pytest.raises(InputError):
         import_log(folder / "backlash2.csv.gz")
+
+
+@pytest.mark.parametrize("name", ["log.mat", "rows.mat", "v73.mat"])
+def test_a_long_matrix_is_its_columns(tmp_path, name):
+    """As MATLAB's users save a log: one array, a signal a column; 7.3 stores it transposed."""
+    path = tmp_path / name
+    data = np.column_stack((np.arange(60) * 1e-3, np.sin(np.arange(60) * 0.1)))
+    if name == "v73.mat":
+        write_hdf(path, {"data": data.T})
+    else:
+        savemat(path, {"data": data if name == "log.mat" else data.T, "square": np.eye(9)})
+    table = read_table(path)
+    assert list(table.columns) == ["data_1", "data_2"]
+    np.testing.assert_array_equal(np.column_stack(list(table.columns.values())), data)
+    assert any("passed over" in note for note in table.notes)

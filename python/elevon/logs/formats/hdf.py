@@ -1,4 +1,4 @@
-"""Logs in HDF5 files (MATLAB 7.3, NetCDF 4): every vector of numbers."""
+"""Logs in HDF5 files (MATLAB 7.3, NetCDF 4): every vector of numbers, matrices as signals."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from elevon.containers.hdf import datasets, opened, text_attribute, vector
+from elevon.containers.hdf import array, datasets, opened, text_attribute
 from elevon.errors import quoted
 from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.table import FloatArray
+from elevon.logs.formats.vectors import columns_of, signals_side_by_side
 
 
 def numeric_vectors(
@@ -47,14 +48,18 @@ def numeric_vectors(
         total = 0
         for name, data in datasets(file, notes):
             place = f"{path}, {quoted(name)}"
-            values = vector(data, "fiub", _bound(limits, place, total, data))
+            bound = _bound(limits, place, total, data)
+            values = array(data, "fiub", bound, also=signals_side_by_side)
             if isinstance(values, str):
                 notes.append(f"{quoted(name)} passed over: {values}")
                 continue
-            total += len(values)
-            vectors[name] = values.astype(np.float64)
-            if unit := text_attribute(data, "units"):
-                units[name] = unit
+            total += values.size
+            numbers = values.astype(np.float64)
+            unit = text_attribute(data, "units")
+            several = signals_side_by_side(numbers.shape)
+            signals = columns_of(name, numbers) if several else {name: numbers.reshape(-1)}
+            vectors.update(signals)
+            units.update(dict.fromkeys(signals, unit) if unit else {})
     return vectors, units, notes
 
 

@@ -12,14 +12,14 @@ from elevon.errors import FormatError, quoted
 from elevon.logs.formats.hdf import numeric_vectors
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.table import FloatArray, RawTable
-from elevon.logs.formats.vectors import table_of_vectors
+from elevon.logs.formats.vectors import columns_of, signals_side_by_side, table_of_vectors
 
 
 def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
     """Read the numeric vectors of a .mat file, at the top or inside one plain structure.
 
-    Cells, objects, function handles, sparse and complex values are named in the notes and never
-    loaded.
+    A long matrix is read as its columns, ``name_1``, ``name_2`` and on. Cells, objects, function
+    handles, sparse and complex values are named in the notes and never loaded.
 
     Raises
     ------
@@ -51,20 +51,19 @@ def _bounded(path: Path, limits: Limits) -> Generator[Variable, None, None]:
 def _vectors(path: Path, limits: Limits, notes: list[str]) -> dict[str, FloatArray]:
     """Return the numeric vectors of a version 5 file; those inside a structure as ``name/field``.
 
-    What is passed over is added to the notes: matrices, cells, objects, text, complex numbers.
+    Columns of a long matrix are vectors. What is passed over is added to the notes: cells, objects,
+    text, complex numbers.
     """
     vectors: dict[str, FloatArray] = {}
     total = 0
     for variable in _bounded(path, limits):
         for label, item in _members(path, variable):
-            vector = _vector(label, item, notes)
-            if vector is None:
-                continue
-            if label in vectors:
-                raise FormatError(f"{path}: two variables are named {quoted(label)}")
-            total += len(vector)
-            limits.check_shape(str(path), total, 1)
-            vectors[label] = vector
+            for name, vector in _columns(label, item, notes).items():
+                if name in vectors:
+                    raise FormatError(f"{path}: two variables are named {quoted(name)}")
+                total += len(vector)
+                limits.check_shape(str(path), total, 1)
+                vectors[name] = vector
     return vectors
 
 
@@ -81,14 +80,16 @@ def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
         yield f"{variable.name}/{field.name}", field
 
 
-def _vector(label: str, item: Variable, notes: list[str]) -> FloatArray | None:
-    """Decode a vector; None, with a note, for anything else."""
+def _columns(label: str, item: Variable, notes: list[str]) -> dict[str, FloatArray]:
+    """Decode a vector, or the columns of a long matrix; none, with a note, for anything else."""
     reason = "" if item.kind == "numbers" else item.kind
     if not reason and item.is_complex:
         reason = "complex numbers"
+    if not reason and signals_side_by_side(item.shape):
+        return columns_of(label, item.numbers().reshape(item.shape, order="F"))
     if not reason and sum(length != 1 for length in item.shape) > 1:
-        reason = f"not a vector, shape {item.shape}"
+        reason = f"neither a vector nor signals side by side, shape {item.shape}"
     if reason:
         notes.append(f"{quoted(label)} passed over: {reason}")
-        return None
-    return item.numbers()
+        return {}
+    return {label: item.numbers()}

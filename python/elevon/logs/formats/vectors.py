@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from elevon.errors import FormatError, quoted
 from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.table import FloatArray, RawTable
 
+#: A matrix with at most so many columns, and at least so many rows a column, holds signals side by
+#: side (ASSUMED): what is nearer to a square is something else.
+_MOST_SIGNALS, _ROWS = 64, 10
 _TIMES = ("xms", "time", "t", "time_s", "time_ms", "timems", "x")
 
 
@@ -48,6 +51,28 @@ def table_of_vectors(
     columns = {short[name]: values for name, values in aligned.items()}
     stated = {short[name]: unit for name, unit in units.items() if name in aligned}
     return RawTable(source, columns, stated, tuple(notes), file_format)
+
+
+def signals_side_by_side(shape: Sequence[int]) -> bool:
+    """Whether a matrix of this shape holds signals, one a column (or a row, where rows are few)."""
+    if len(shape) != 2:
+        return False
+    few, many = sorted(shape)
+    return 1 < few <= _MOST_SIGNALS and many >= _ROWS * few
+
+
+def columns_of(name: str, matrix: FloatArray) -> dict[str, FloatArray]:
+    """Return the signals of a matrix by name and number, counted from 1 as MATLAB does.
+
+    Parameters
+    ----------
+    name : str
+        The matrix's.
+    matrix : ndarray, shape (n, k) or (k, n)
+        The longer side is time.
+    """
+    rows = matrix if matrix.shape[0] >= matrix.shape[1] else matrix.T
+    return {f"{name}_{k + 1}": np.ascontiguousarray(rows[:, k]) for k in range(rows.shape[1])}
 
 
 def quiet(values: FloatArray) -> FloatArray:

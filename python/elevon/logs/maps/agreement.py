@@ -96,3 +96,21 @@ def _integral(time: FloatArray, rate: FloatArray) -> FloatArray:
     filled = np.where(np.isfinite(rate), rate, 0.0)
     steps = 0.5 * (filled[1:] + filled[:-1]) * np.diff(time)
     return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def evened(time: FloatArray) -> FloatArray:
+    """Return a time column with the repeated readings of a coarse clock spread evenly.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Never going back, rising somewhere.
+    """
+    count = len(time)
+    first = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    # The last reading lasts as long as the usual one.
+    length = float(np.median(np.diff(first)))
+    rate = float(np.median(np.diff(time[first]))) / length
+    rows = np.append(first, count)
+    readings = np.append(time[first], time[-1] + rate * (count - first[-1]))
+    return np.asarray(np.interp(np.arange(count), rows, readings), dtype=np.float64)

@@ -13,7 +13,7 @@ import numpy as np
 
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.table import FloatArray, RawTable
-from elevon.logs.maps.agreement import slope_and_fit
+from elevon.logs.maps.agreement import evened, slope_and_fit
 from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint, unit_hint
 from elevon.logs.maps.motion import MotionColumns, find_motion
@@ -22,6 +22,7 @@ from elevon.logs.maps.time_unit import TIME_UNITS, settle_time_unit
 from elevon.units import parse_unit
 
 _EVEN = 0.25  # of the columns that rise, the one whose steps scatter least is the time
+_MOVES = 0.05  # of a clock's steps, at least, are no repetition: a command that steps is no clock
 _CURRENT = 0.2  # share of a column that acceleration, friction and speed must explain
 _DEFAULT_UNITS = {
     "torque_current": "A", "current_ref": "A", "direct_current": "A", "supply_current": "A",
@@ -84,7 +85,7 @@ def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
             len(steps)
             and np.isfinite(steps).all()
             and (steps >= 0.0).all()
-            and values[-1] > values[0]
+            and np.count_nonzero(steps) > _MOVES * len(steps)
         ):
             rising[name] = float(np.std(steps) / np.mean(steps))
     if not rising:
@@ -99,7 +100,7 @@ def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
     entry.reasons.append("named as time" if named else "rises throughout, most evenly")
     settle_time_unit(entry, table, columns)
     scale = TIME_UNITS.get(entry.unit, 1.0)
-    return np.asarray(table.columns[name] * scale, dtype=np.float64)
+    return np.asarray(evened(table.columns[name]) * scale, dtype=np.float64)
 
 
 def _headers(columns: Mapping[str, GuessedColumn]) -> None:

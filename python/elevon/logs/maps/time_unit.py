@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from elevon.logs.formats.table import FloatArray, RawTable
-from elevon.logs.maps.agreement import slope_and_fit
+from elevon.logs.maps.agreement import evened, slope_and_fit
 from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint
 from elevon.units import Unit, parse_unit
@@ -30,7 +30,7 @@ def settle_time_unit(
     there are none the header counts, else the size of the steps; a reading that is not the only
     possible one is stated.
     """
-    step = float(np.median(np.diff(table.columns[entry.name])))
+    step = float(np.median(np.diff(evened(table.columns[entry.name]))))
     consistent = _by_motion(table.columns[entry.name], table, columns)
     if consistent is not None:
         if entry.unit and entry.unit != consistent:
