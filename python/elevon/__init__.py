@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from elevon.diagnose.door import diagnose as diagnose
     from elevon.diagnose.door import monitor as monitor
     from elevon.diagnose.learning.door import learn_spread as learn_spread
+    from elevon.doctor.door import doctor as doctor
     from elevon.doors import bench as bench
     from elevon.doors import compare as compare
     from elevon.doors import effects as effects
@@ -52,6 +53,7 @@ _PUBLIC = {
     "calibrate": "elevon.calibrate.door",
     "compare": "elevon.doors",
     "diagnose": "elevon.diagnose.door",
+    "doctor": "elevon.doctor.door",
     "effects": "elevon.doors",
     "export_fmu": "elevon.deploy",
     "fleet": "elevon.prognose.door",

@@ -29,6 +29,7 @@ _KINDS = {
     "comparison": "elevon.compare:Comparison",
     "diagnosis": "elevon.diagnose.engine.answer:Diagnosis",
     "effects": "elevon.analysis.effects:Effects",
+    "examination": "elevon.doctor.answer:Examination",
     "fleet": "elevon.prognose.fleet:FleetPlan",
     "linear-model": "elevon.response.linear:LinearModel",
     "loop-response": "elevon.response.loop:LoopResponse",

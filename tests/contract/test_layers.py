@@ -28,7 +28,7 @@ ROWS = [
     ["bench", "campaign", "calibrate", "compare", "session", "deploy"],
     ["lowfit", "analysis", "benchmark", "compare_loads", "response", "environment"],
     ["diagnose"],
-    ["nexttest", "training"],
+    ["nexttest", "training", "doctor"],
     ["prognose"],
     ["reproduce", "doors"],
     ["demo", "live", "safety"],

@@ -184,6 +184,8 @@ RECIPES = {
                         {"drops.csv": "@torino_compliance"}, code=(0, 1)),
     "validate": _analysis("log/log.csv", *ROTARY, "--transient", "1", "--report", "val.html",
                           "--force", long=True, points=10, code=(0, 1)),
+    "doctor": _analysis("log/log.csv", *ROTARY, "--baseline", "base/log.csv", "--out", "look",
+                        "--force", logs=("log", "base"), long=True, points=8, code=(0, 1)),
     "diagnose": _analysis("log/log.csv", *ROTARY, "--baseline", "base/log.csv", "--report",
                           "dia.html", "--append", "history", "--usage", "600 flights", "--force",
                           logs=("log", "base"), long=True, points=8, code=(0, 1)),

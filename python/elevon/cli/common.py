@@ -127,6 +127,10 @@ CommandOption = Annotated[
         help="Command note; one for each log, or one for all. By default NAME_command.json.",
     ),
 ]
+BaselineOption = Annotated[
+    list[Path] | None,
+    typer.Option("--baseline", metavar="LOG", help="Log of the healthy unit; repeatable."),
+]
 MapOption = Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")]
 TransientOption = Annotated[
     float | None, typer.Option(min=0.0, help="Left out at the beginning of each log [s].")

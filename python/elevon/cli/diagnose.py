@@ -28,10 +28,7 @@ def diagnose(
     loadcell: common.LoadcellOption = None,
     command: common.CommandOption = None,
     column_map: common.MapOption = None,
-    baseline: Annotated[
-        list[Path] | None,
-        typer.Option("--baseline", metavar="LOG", help="Log of the healthy unit; repeatable."),
-    ] = None,
+    baseline: common.BaselineOption = None,
     method: Annotated[
         str, typer.Option(help="model, surrogate, or both (it proposes, the model refines).")
     ] = "model",

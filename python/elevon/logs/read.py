@@ -100,13 +100,18 @@ def read_logs(
     read = [_imported(p, maps[k], texts[k], cells[k]) for k, p in enumerate(paths)]
     if one_rate:
         same_rate(read)
+    return named_apart(read)
+
+
+def named_apart(read: Sequence[ImportedLog]) -> list[Log]:
+    """Return imported logs by their roles; before one name of several stands the folder."""
     logs = [log_of(item) for item in read]
     names = [log.name for log in logs]
     return [
-        replace(log, name=f"{Path(path).resolve().parent.name}/{log.name}")
+        replace(log, name=f"{Path(item.report.source).resolve().parent.name}/{log.name}")
         if names.count(log.name) > 1
         else log
-        for path, log in zip(paths, logs, strict=True)
+        for item, log in zip(read, logs, strict=True)
     ]
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
 PICTURES = (".png", ".svg", ".pdf")
+_NONE: Mapping[str, str] = {}
 _MOST_POINTS = 100_000
 """On a picture of some thousand pixels the extremes of this many slices look like all samples."""
 
@@ -44,11 +45,11 @@ def plot(
     if path is not None:
         check_output(path, force=force)
     heading = str(recording.meta.get("actuator", "Recording")) if title is None else title
-    panels = _chosen(recording, names, units)
+    panels = panels_of(recording, names, units)
     marked = bands(recording)
     if compare is not None:
         name, other = compare
-        panels = overlaid(panels, _chosen(other, names, units), name)
+        panels = overlaid(panels, panels_of(other, names, units), name)
         marked += [item for item in bands(other) if item.kind == "fault" and item not in marked]
     if with_spectra:
         panels = panels + spectra(panels)
@@ -62,8 +63,8 @@ def plot(
     return Path(path).expanduser()
 
 
-def _chosen(
-    recording: Recording, names: Iterable[str] | None, units: Mapping[str, str]
+def panels_of(
+    recording: Recording, names: Iterable[str] | None = None, units: Mapping[str, str] = _NONE
 ) -> list[Panel]:
     """Return the panels of the channels named; without names the run's, or of every channel."""
     for name in units:

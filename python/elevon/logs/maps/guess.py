@@ -46,12 +46,15 @@ class Guess:
         Motor over output, where both angles show it.
     travel_per_turn : float or None
         m of the output for one turn of the motor.
+    swapped : (str, str) or None
+        Columns of motor and output whose headers name the other.
     """
 
     source: str
     columns: list[GuessedColumn]
     gear_ratio: float | None = None
     travel_per_turn: float | None = None
+    swapped: tuple[str, str] | None = None
 
 
 def guess_map(table: RawTable) -> Guess:
@@ -73,7 +76,10 @@ def guess_map(table: RawTable) -> Guess:
     if motion.position is not None:
         _current(time, table, columns, motion)
     _units(columns)
-    return Guess(table.source, list(columns.values()), motion.gear_ratio, motion.travel_per_turn)
+    return Guess(
+        table.source, list(columns.values()), motion.gear_ratio, motion.travel_per_turn,
+        motion.swapped,
+    )  # fmt: skip
 
 
 def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
@@ -147,6 +153,8 @@ def _candidates(
 
 
 def _apply(motion: MotionColumns, columns: Mapping[str, GuessedColumn]) -> None:
+    for name in motion.swapped or ():
+        columns[name].role = ""
     for name, finding in motion.findings.items():
         item = columns[name]
         if finding.role and finding.role != item.role:

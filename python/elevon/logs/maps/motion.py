@@ -21,6 +21,7 @@ Candidates = Mapping[str, tuple[str, str, FloatArray]]
 _INTEGRAL = 0.9  # share of a position that the integral of its speed explains
 _FOLLOWS = 0.5  # share of a signal that its delayed set point explains
 _SAME = 0.02  # relative: a factor nearer one than this is one
+_FAR_LESS = 0.67  # share of the motor's travel, at most, of an output behind a gear
 _LINEAR = {"mm": "mm/s", "m": "m/s", "cm": "cm/s", "um": "um/s"}
 _ANGULAR = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s"}
 _LONGEST = 1.0  # s: latest that an output follows its command
@@ -51,6 +52,8 @@ class MotionColumns:
         The position in the file's unit.
     gear_ratio, travel_per_turn : float or None
         Between the two, where they are on different shafts; m for one turn.
+    swapped : (str, str) or None
+        Columns of motor and output whose headers name the other.
     """
 
     findings: dict[str, ColumnFinding] = field(default_factory=dict)
@@ -59,6 +62,7 @@ class MotionColumns:
     smooth: FloatArray = field(default_factory=lambda: np.zeros(0))
     gear_ratio: float | None = None
     travel_per_turn: float | None = None
+    swapped: tuple[str, str] | None = None
 
 
 def find_motion(time: FloatArray, candidates: Candidates) -> MotionColumns:
@@ -135,9 +139,31 @@ def _settle(motion: MotionColumns, candidates: Candidates, slope: float, explain
         speed.role = "motor_speed"
         if abs(math.log(factor)) < _SAME:
             position.role = hint or "motor_position"
+            if hint == "output_position":
+                _swap(motion, candidates)
+        elif hint == "motor_position":  # on one shaft there is no ratio: one of the two is wrong
+            speed.reasons.append("clipped, or another unit: on one shaft it would be the integral")
         else:
             motion.gear_ratio = 1.0 / factor
             speed.reasons.append(f"turns {motion.gear_ratio:.5g} times as far as the output")
+
+
+def _swap(motion: MotionColumns, candidates: Candidates) -> None:
+    """Give the position that moves with the motor its role, where headers name another so.
+
+    The one named so must move far less: it is the output's.
+    """
+    moves = motion.position
+    assert moves is not None
+    named = next((n for n, c in candidates.items() if c[0] == "motor_position"), None)
+    if named is None or np.ptp(candidates[named][2]) > _FAR_LESS * np.ptp(candidates[moves][2]):
+        return
+    motion.swapped = (moves, named)
+    motion.findings[moves].role = "motor_position"
+    motion.findings[moves].reasons.append(f"swapped with {named!a}: it moves as the motor does")
+    motion.findings[named] = ColumnFinding(
+        "output_position", candidates[named][1], 1, [f"swapped with {moves!a}: it moves less"]
+    )
 
 
 def _pair_units(position: str, speed: str, slope: float, reasons: list[str]) -> tuple[str, str]:

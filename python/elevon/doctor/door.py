@@ -1,0 +1,174 @@
+"""The door `elevon.doctor`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from elevon.calibrate.door import validate
+from elevon.calibrate.validation import TRANSIENT, Validation
+from elevon.diagnose.door import diagnose
+from elevon.diagnose.engine.answer import Diagnosis
+from elevon.doctor.answer import Examination
+from elevon.doctor.data import checks_of, columns_of
+from elevon.errors import InputError
+from elevon.logs.foreign import ForeignLog, import_foreign
+from elevon.logs.log import Log
+from elevon.logs.maps.guess_write import guess_text
+from elevon.logs.read import named_apart
+from elevon.progress import Progress, part
+from elevon.simulate.arguments import as_actuator
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.logs.maps.column_map import ColumnMap
+    from elevon.simulate.arguments import ActuatorLike
+
+PathLike = str | os.PathLike[str]
+_SETTLES = 0.25  # share of a log that is left out where no actuator file states a transient
+
+
+def doctor(
+    logs: PathLike | Sequence[PathLike],
+    actuator: ActuatorLike,
+    baselines: PathLike | Sequence[PathLike] = (),
+    *,
+    map: ColumnMap | PathLike | None = None,  # noqa: A002 - the option's name
+    loadcells: Sequence[PathLike | None] = (),
+    notes: Sequence[PathLike | None] = (),
+    false_alarm: float = 0.05,
+    progress: Progress | None = None,
+) -> Examination:
+    """Look at logs for the first time: columns, data, the model's fit, the verdict.
+
+    Parameters
+    ----------
+    logs : path, or sequence of paths
+        Of one unit in one condition.
+    actuator : Actuator, str or path
+        The healthy unit, best calibrated.
+    baselines : path, or sequence of paths
+        Of the healthy unit in the same test.
+    map : ColumnMap or path, optional
+        What the columns are, in all logs; else their headers say it, or a guess.
+    loadcells, notes : sequence of path or None
+        One for each log; by default those that stand beside it.
+    false_alarm : float
+        Rate at which a healthy unit may be called faulty.
+    progress : callable, optional
+        Called with the done fraction; returns False to stop.
+
+    Returns
+    -------
+    Examination
+        What cannot be answered has its reason in `Examination.reasons`.
+
+    Raises
+    ------
+    InputError
+        No log, or one that cannot be read.
+    """
+    model = as_actuator(actuator)
+    given, healthy = _paths(logs), _paths(baselines)
+    if not given:
+        raise InputError("doctor: needs at least one log")
+    read = _read([*given, *healthy], map, loadcells, notes)
+    named = named_apart([item.imported for item in read])
+    unit, reference = named[: len(given)], named[len(given) :]
+    reasons: dict[str, str] = {}
+    fit = _fit(unit, reference, model, reasons, part(progress, 0.0, 0.4))
+    verdict = _verdict(unit, reference, model, reasons, false_alarm)
+    if progress is not None:
+        progress(1.0)
+    guessed = next((item.guess for item in read if item.guess is not None), None)
+    names = [log.name for log in named]
+    return Examination(
+        model.name,
+        tuple(log.name for log in unit),
+        tuple(log.name for log in reference),
+        _by(map, guessed is not None),
+        tuple(c for name, item in zip(names, read, strict=True) for c in columns_of(name, item)),
+        tuple(
+            check for name, item in zip(names, read, strict=True) for check in checks_of(name, item)
+        ),
+        fit,
+        verdict,
+        reasons,
+        "" if guessed is None else guess_text(guessed),
+        {log.name: log.recording for log in named if log.recording is not None},
+    )
+
+
+def _by(column_map: object, guessed: bool) -> Literal["map", "guess", "headers"]:
+    return "map" if column_map is not None else "guess" if guessed else "headers"
+
+
+def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
+    return [Path(p) for p in ([given] if isinstance(given, (str, os.PathLike)) else given)]
+
+
+def _read(
+    paths: Sequence[Path],
+    column_map: ColumnMap | PathLike | None,
+    loadcells: Sequence[PathLike | None],
+    notes: Sequence[PathLike | None],
+) -> list[ForeignLog]:
+    """Read the logs; the map guessed of one serves those after it that it does not contradict."""
+    cells, texts = [*loadcells, *[None] * len(paths)], [*notes, *[None] * len(paths)]
+    read: list[ForeignLog] = []
+    for path, cell, note in zip(paths, cells, texts, strict=False):
+        guessed = next((log.column_map for log in read if log.guess is not None), None)
+        sidecars = {"loadcell": _path(cell), "command": _path(note)}
+        try:
+            read.append(import_foreign(path, _map(column_map) or guessed, **sidecars))
+        except InputError as error:
+            if column_map is None and guessed is not None:
+                read.append(import_foreign(path, **sidecars))
+            elif str(path) in str(error):
+                raise
+            else:
+                raise InputError(f"{path}: {error}") from error
+    return read
+
+
+def _path(given: PathLike | None) -> Path | None:
+    return None if given is None else Path(given)
+
+
+def _map(given: ColumnMap | PathLike | None) -> ColumnMap | Path | None:
+    return Path(given) if isinstance(given, (str, os.PathLike)) else given
+
+
+def _fit(
+    logs: Sequence[Log],
+    healthy: Sequence[Log],
+    actuator: Actuator,
+    reasons: dict[str, str],
+    progress: Progress | None,
+) -> Validation | None:
+    """Hold the model against all logs; why it cannot be goes into `reasons`."""
+    both = [*logs, *healthy]
+    stated = "transient" in (actuator.validation or {})
+    shortest = min(log.duration for log in both)
+    transient = None if stated else min(TRANSIENT, _SETTLES * shortest)
+    try:
+        return validate(both, actuator, transient=transient, progress=progress)
+    except InputError as error:
+        reasons["fit"] = str(error)
+        return None
+
+
+def _verdict(
+    logs: Sequence[Log],
+    healthy: Sequence[Log],
+    actuator: Actuator,
+    reasons: dict[str, str],
+    false_alarm: float,
+) -> Diagnosis | None:
+    try:
+        return diagnose(logs, actuator, healthy, false_alarm=false_alarm)
+    except InputError as error:
+        reasons["verdict"] = str(error)
+        return None
