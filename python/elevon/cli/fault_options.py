@@ -48,6 +48,6 @@ def _in_words(record: FaultRecord, fault: Fault, name: str) -> str:
     unit = record.unit or "1"
     if unit != "1":
         return format_quantity(value, display_unit(unit))
-    if record.effect.startswith("1: "):
+    if record.switched:
         return f"{value:g}"
     return f"{100.0 * value:{'+' if record.maximum > 1.0 else ''}.6g} %"

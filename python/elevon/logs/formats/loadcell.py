@@ -21,6 +21,7 @@ from elevon.logs.formats.text import read_text_table
 from elevon.units import check_kind, to_si
 
 FloatArray = npt.NDArray[np.float64]
+Notes = tuple[str, ...]
 _UNITS = {"N": "N", "Nm": "N m", "N m": "N m", "kg": "kg", "g": "g"}
 _GRAVITY = 9.80665
 
@@ -124,45 +125,42 @@ def read_loadcell(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> LoadC
             f"this one has {len(table.columns)}"
         )
     (time_name, time), (value_name, value) = table.columns.items()
-    notes = list(table.notes)
     for name, column in ((time_name, time), (value_name, value)):
         if np.isnan(column).any():
             row = int(np.argmax(np.isnan(column))) + 1
             raise FormatError(f"{table.source}, row {row}: no number for {quoted(name)}")
-    scale = _time_scale(table.units.get(time_name, ""), time_name, time, notes)
-    factor, unit = _value_unit(table.source, table.units.get(value_name, ""), notes)
+    scale, taken = _time_scale(table.units.get(time_name, ""), time_name, time)
+    factor, unit, converted = _value_unit(table.source, table.units.get(value_name, ""))
     seconds = time * scale
     back = np.flatnonzero(np.diff(seconds) < 0.0)
     if back.size:
         raise FormatError(f"{table.source}, row {back[0] + 2}: time runs backwards")
-    return LoadCellLog(seconds, value * factor, unit, tuple(notes))
+    return LoadCellLog(seconds, value * factor, unit, (*table.notes, *taken, *converted))
 
 
-def _time_scale(unit: str, name: str, time: FloatArray, notes: list[str]) -> float:
+def _time_scale(unit: str, name: str, time: FloatArray) -> tuple[float, Notes]:
+    """Return seconds a unit of time, and what was taken for granted."""
     text = unit or ("ms" if name.strip().lower() in {"xms", "time_ms", "timems", "t_ms"} else "")
     if text:
         check_kind(text, "s", "load cell, time")
-        return float(to_si(1.0, text))
+        return float(to_si(1.0, text)), ()
     # A load cell samples at 1 to 1000 Hz: a mean spacing of 1 or more can only be milliseconds,
     # one of 0.5 s or less in ms would be above 2 kHz, which no such converter reaches.
     spacing = float(time[-1] - time[0]) / max(len(time) - 1, 1)
-    if spacing >= 1.0:
-        notes.append(f"load-cell time taken as ms: spacing {spacing:.4g}")
-        return 1e-3
-    notes.append(f"load-cell time taken as s: spacing {spacing:.4g}")
-    return 1.0
+    scale, taken = (1e-3, "ms") if spacing >= 1.0 else (1.0, "s")
+    return scale, (f"load-cell time taken as {taken}: spacing {spacing:.4g}",)
 
 
-def _value_unit(source: str, unit: str, notes: list[str]) -> tuple[float, str]:
+def _value_unit(source: str, unit: str) -> tuple[float, str, Notes]:
+    """Return factor and SI unit of the values, and what was taken for granted."""
     if not unit:
-        notes.append("load-cell value taken as a force in N: the file states no unit")
-        return 1.0, "N"
+        return 1.0, "N", ("load-cell value taken as a force in N: the file states no unit",)
     if unit not in _UNITS:
         raise InputError(f"{source}: load-cell unit {quoted(unit)}; valid: {', '.join(_UNITS)}")
     if unit in {"kg", "g"}:
-        notes.append(f"load-cell value in {unit}: converted with g = {_GRAVITY} m/s2")
-        return _GRAVITY * (1.0 if unit == "kg" else 1e-3), "N"
-    return 1.0, _UNITS[unit]
+        note = f"load-cell value in {unit}: converted with g = {_GRAVITY} m/s2"
+        return _GRAVITY * (1.0 if unit == "kg" else 1e-3), "N", (note,)
+    return 1.0, _UNITS[unit], ()
 
 
 def _positive(name: str, value: float) -> None:

@@ -20,7 +20,7 @@ def table_of_vectors(
     source: str,
     vectors: Mapping[str, FloatArray],
     units: Mapping[str, str],
-    notes: list[str],
+    notes: Sequence[str],
     *,
     file_format: str,
     limits: Limits,
@@ -40,8 +40,10 @@ def table_of_vectors(
     if length == 0:
         raise FormatError(f"{source}: the vectors are empty")
     aligned = {name: quiet(values) for name, values in vectors.items() if len(values) == length}
-    for name in vectors.keys() - aligned.keys():
-        notes.append(f"{quoted(name)} passed over: {len(vectors[name])} values, not {length}")
+    others = [
+        f"{quoted(name)} passed over: {len(vectors[name])} values, not {length}"
+        for name in vectors.keys() - aligned.keys()
+    ]
     limits.check_shape(source, length, len(aligned))
     last = [name.rpartition("/")[2] for name in aligned]
     short = {
@@ -50,7 +52,7 @@ def table_of_vectors(
     }
     columns = {short[name]: values for name, values in aligned.items()}
     stated = {short[name]: unit for name, unit in units.items() if name in aligned}
-    return RawTable(source, columns, stated, tuple(notes), file_format)
+    return RawTable(source, columns, stated, (*notes, *others), file_format)
 
 
 def signals_side_by_side(shape: Sequence[int]) -> bool:
