@@ -70,6 +70,7 @@ ANSWERS = {
     "validate": (("log/log.csv", *ROTARY, "--transient", "1"),
                  r"^torino-rotary: (not )?(passed|measured)",
                  LOGS, False),
+    "plot": (("log/log.csv",), r"^wrote log\.html: \d+ signals of log\.csv$", LOGS, False),
     "doctor": (("log/log.csv", *ROTARY, "--baseline", "base/log.csv"),
                r"^(HEALTHY \(p = |FAULTY: |UNKNOWN FAULT: |MODEL DOES NOT FIT: ).*data: ", LOGS,
                True),

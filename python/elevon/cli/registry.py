@@ -38,6 +38,7 @@ _HELP = {
     "loads": "Turn a recorded flight into an actuator's load.",
     "export": "Write an actuator for other tools: FMUs, the C interface.",
     "import": "Read bench and drive logs into recordings.",
+    "plot": "Draw a recording, a log, a run of a campaign or a result.",
     "doctor": "Look at a log for the first time: data, fit, verdict.",
     "features": "Compute features of a recording or a log.",
     "calibrate": "Fit an actuator's parameters to logs.",
