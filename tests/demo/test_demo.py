@@ -5,8 +5,8 @@ import json
 import pytest
 
 from elevon import Actuator
+from elevon.bench.hidden import RECOVERED, hidden_actuator
 from elevon.cli import main
-from elevon.demo.hidden import RECOVERED, hidden_actuator
 
 
 def test_the_hidden_actuator_differs_and_is_drawn_by_the_seed():

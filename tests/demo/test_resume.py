@@ -16,12 +16,12 @@ import pytest
 
 import elevon
 from elevon import Actuator
+from elevon.bench.hidden import RECOVERED, hidden_actuator
 from elevon.bench.procedure import load_procedure
 from elevon.calibrate.outcome import Calibration, by_path
 from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.cli import main
 from elevon.demo.finished import FinishedSteps, work_key
-from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.results import Backlashes
 from elevon.demo.run import run_demo
 from elevon.errors import OutputExistsError

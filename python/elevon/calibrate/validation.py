@@ -253,6 +253,37 @@ def _trace(
     transient: float,
     offsets: Mapping[str, float],
 ) -> tuple[ValidationTrace, str]:
+    experiment, how = bench_experiment(log, actuator, fidelity)
+    run = next(experiment.run()).seen(log)
+    logged = (log.output, log.speed, log.current)
+    measured = {
+        name: values - offsets.get(name, 0.0) for name, values in zip(SIGNALS, logged, strict=True)
+    }
+    used = log.good & (log.time >= transient)
+    return ValidationTrace(log.name, log.time, measured, run.channels, used), how
+
+
+def bench_experiment(
+    log: Log, actuator: Actuator, fidelity: str, shows: Sequence[str] = tuple(SIGNALS)
+) -> tuple[Experiment, str]:
+    """Return the test of a log of the rotary bench, and how its command was rebuilt.
+
+    Parameters
+    ----------
+    log : Log
+        With both positions and the set point of the speed.
+    actuator : Actuator
+        The model.
+    fidelity : str
+        ``low`` or ``high``.
+    shows : sequence of str
+        Signals of the model that a run shows.
+
+    Raises
+    ------
+    InputError
+        A position is missing, or the command cannot be rebuilt.
+    """
     if not log.has("output_position") or not log.has("motor_position"):
         raise InputError(
             f"{log.name}: validation needs both positions (r4820, r4821): they give the command "
@@ -278,15 +309,9 @@ def _trace(
     feedback = str(actuator.parameters["control.position_feedback"].value)
     if feedback == "output" and offset != 0.0:
         model = actuator.with_values({"control.position_feedback": "encoder"})
-    shows, rate = {name: name for name in SIGNALS}, _rate(model, fidelity, log.period)
-    experiment = Experiment(log, model, inputs, shows, rate=rate, fidelity=fidelity, notices=True)
-    run = next(experiment.run()).seen(log)
-    logged = (log.output, log.speed, log.current)
-    measured = {
-        name: values - offsets.get(name, 0.0) for name, values in zip(SIGNALS, logged, strict=True)
-    }
-    used = log.good & (log.time >= transient)
-    return ValidationTrace(log.name, log.time, measured, run.channels, used), how
+    rate = _rate(model, fidelity, log.period)
+    names = {name: name for name in shows}
+    return Experiment(log, model, inputs, names, rate=rate, fidelity=fidelity, notices=True), how
 
 
 def _rate(actuator: Actuator, fidelity: str, period: float) -> str:

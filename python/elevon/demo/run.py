@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from elevon.actuator import Actuator
+from elevon.bench.hidden import RECOVERED, hidden_actuator
 from elevon.calibrate import Validation, calibrate, validate
 from elevon.calibrate.outcome import Calibration
 from elevon.demo.finished import FinishedSteps, inputs_of, work_key
-from elevon.demo.hidden import RECOVERED, hidden_actuator
 from elevon.demo.procedure import HELD_OUT, LOADED, demo_procedure
 from elevon.demo.results import Backlashes
 from elevon.demo.steps import Story, Work

@@ -6,6 +6,7 @@ import numpy as np
 
 from elevon.compare import Comparison
 from elevon.report import Report, ReportTable
+from elevon.report.document import Section
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.provenance import provenance
 
@@ -24,7 +25,7 @@ def compare_report(comparison: Comparison, actuator: str, *, date: str | None = 
     report.fact("Torque current", f"{100 * comparison.q_current_nrmse:.2f} %", "RMS error over RMS")
     speed = f"low at {values['low_realtime_factor']:.0f} times real time"
     report.fact("Speed-up", f"{comparison.speed_up:.0f}", speed)
-    _draw(report, comparison)
+    draw_comparison(report.section("Side by side"), comparison)
     numbers = [[name, value] for name, value in values.items() if isinstance(value, float)]
     report.section("Numbers").table(ReportTable(["Quantity", "Value"], numbers))
     report.provenance(
@@ -49,8 +50,8 @@ def _panel(comparison: Comparison, part: str) -> tuple[str, str, float]:
     return name, f"{_NAMES[part]} [{text}]", scale
 
 
-def _draw(report: Report, comparison: Comparison) -> None:
-    section = report.section("Side by side")
+def draw_comparison(section: Section, comparison: Comparison) -> None:
+    """Draw each signal of both models, and their difference."""
     panels = [_panel(comparison, part) for part in comparison.signals]
     for name, label, scale in panels:
         ratios = {"height_ratios": [3, 1]}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, default_scenario, filtered
-from elevon.plain import Plain
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.report import Check
 from elevon.report.checks import CheckedResult
@@ -65,6 +66,7 @@ class LowFidelityResult(CheckedResult):
 
     actuator: str
     rows: tuple[CaseRow, ...]
+    comparisons: Annotated[tuple[Comparison, ...], WORKING] = ()
 
     @property
     def checks(self) -> list[Check]:
@@ -95,7 +97,7 @@ def reproduce_low_fidelity(
     SimulationError
         A run did not reach its end.
     """
-    rows = []
+    rows, comparisons = [], []
     for number, (name, (drive, braked, floored)) in enumerate(CASES.items()):
         start, stop = number / 4.0, (number + 1) / 4.0
         model = actuator.with_values({"drive.kind": drive})
@@ -104,7 +106,8 @@ def reproduce_low_fidelity(
         span = part(progress, stop, 1.0)
         floor = _floor(model, scenario, comparison, seed, span) if floored else None
         rows.append(_row(name, comparison, floor))
-    return LowFidelityResult(actuator.name, tuple(rows))
+        comparisons.append(comparison)
+    return LowFidelityResult(actuator.name, tuple(rows), tuple(comparisons))
 
 
 def _scenario(actuator: Actuator, braked: bool) -> Scenario:

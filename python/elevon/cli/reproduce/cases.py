@@ -34,7 +34,7 @@ _DATA = Annotated[
 ]
 
 
-def low_fidelity(actuator: str, seed: int, progress: Any) -> Any:
+def low_fidelity(actuator: str, seed: int, progress: Any = None) -> Any:
     """Return the three cases of one actuator."""
     from elevon.cli.common import read_actuator
     from elevon.reproduce.low_fidelity import reproduce_low_fidelity
@@ -176,7 +176,18 @@ CASES = (
         "elevon.cli.reproduce.cases:low_fidelity",
         ("name", "position_nrmse", "speed_nrmse", "q_current_nrmse", "q_current_rms_a",
          "q_current_error_a", "floor_a"),
+        page=_R + "low_fidelity_page:low_fidelity_page",
         options={"actuator": (_ACTUATOR, "torino-rotary")},
+    ),
+    PublishedCase(
+        "torino-validation",
+        "Calibrate on a bench with hidden values, then predict it at three backlashes.",
+        "six logs of the bench, three of the model",
+        _R + "torino_bench.validation:reproduce_torino_validation",
+        ("micrometer_mm", "signal", "rms", "percent_of_range", "ratio", "unit"),
+        "model less virtual bench; the works print no error",
+        page=_R + "torino_bench.validation_page:torino_validation_page",
+        options={"fidelity": (_FIDELITY, "high")},
     ),
     PublishedCase(
         "nasa-current",

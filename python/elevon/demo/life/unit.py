@@ -12,7 +12,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.demo.hidden import hidden_actuator
+from elevon.bench.hidden import hidden_actuator
 from elevon.faults import Fault
 from elevon.prognose import Mission, Process, respond
 from elevon.prognose.law import Law

@@ -1,0 +1,77 @@
+"""A bench whose values nobody at it knows: its logs, and the model calibrated on some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from elevon.actuator import Actuator
+from elevon.bench.procedure import Procedure
+from elevon.documents import Document, validated
+from elevon.errors import SimulationError
+from elevon.logs.log import Log
+from elevon.progress import Progress
+
+ACTUATOR = "torino-rotary"
+READINGS = (14.0, 12.4, 9.15)
+"""Micrometer in mm: rows 1, 7 and 14 of the table, no, medium and most added backlash."""
+SINE = {"kind": "sine", "amplitude": "7 deg", "bias": "10 deg", "frequency": "0.2 Hz"}
+CHIRP = {"kind": "chirp", "amplitude": "3 deg", "bias": "10 deg", "start_frequency": "0.1 Hz",
+         "end_frequency": "1.1 Hz", "sweep_time": "20 s"}  # fmt: skip
+WIDE = {"kind": "sine", "amplitude": "45 deg", "bias": "60 deg", "frequency": "0.05 Hz"}
+RAMP = {"kind": "ramp", "initial": "0.2 N m", "slope": "0.09 N m/s", "start": "0 s", "end": "20 s"}
+
+
+def trace(name: str, term: Mapping[str, Any], duration: float) -> dict[str, Any]:
+    """Return the step that records one log."""
+    command = {"terms": [dict(term)]}
+    return {"kind": "trace", "name": name, "duration": f"{duration} s", "command": command}
+
+
+def micrometer(reading: float) -> dict[str, Any]:
+    """Return the step that sets the backlash, as it was measured at a reading in mm."""
+    return {"kind": "backlash", "micrometer": f"{reading} mm", "curve": "measured"}
+
+
+def calibration_steps() -> list[dict[str, Any]]:
+    """Return the logs that a calibration needs, the encoder's wheel in full mesh."""
+    return [
+        micrometer(READINGS[0]),
+        trace("sine", SINE, 20.0),
+        trace("chirp", CHIRP, 20.0),
+        {"kind": "brake", "terms": [RAMP]},
+        trace("loaded", WIDE, 20.0),
+        {"kind": "brake", "terms": []},
+    ]
+
+
+def bench_logs(
+    name: str,
+    steps: Sequence[Mapping[str, Any]],
+    unit: Actuator,
+    *,
+    seed: int,
+    progress: Progress | None = None,
+) -> list[Log]:
+    """Return what the bench records of a procedure on a unit.
+
+    Raises
+    ------
+    SimulationError
+        A run did not reach its end.
+    """
+    from elevon.bench.rig import setups
+    from elevon.bench.traces import recorded
+    from elevon.bench.virtual import traced
+    from elevon.scenario.compile import signal_records
+    from elevon.simulate import Run, simulate_batch
+
+    procedure = validated(Procedure, {"name": name, "step": list(steps)}, Document(name, "", {}))
+    ready = setups(procedure, unit, seed=seed)
+    runs = [Run(s.actuator, s.scenario, s.conditions.seed, s.trace.name) for s in ready]
+    record = recorded(list(signal_records(unit.wiring, "high")))
+    recordings = simulate_batch(runs, fidelity="high", record=record, progress=progress)
+    for run in recordings:
+        if run.status != "ok":
+            raise SimulationError(f"{run.meta['label']}: {run.meta['message']}", run.status)
+    return [traced(setup, run) for setup, run in zip(ready, recordings, strict=True)]

@@ -1,0 +1,387 @@
+"""One error for each kind of check, planted where the number comes from, that must make it fail.
+
+`GOOD` gives the checks of a case without an error; `PLANTED` gives them with one. An error is put
+into what the case finds (or into the parameter that the check judges), never into the check.
+"""
+
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+
+import numpy as np
+
+from elevon.reproduce.nasa.baseline import baseline_matrix
+from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineRow
+from tests.reproduce.planting import given, patched, scaled, with_error
+
+# --- torino-backlash -----------------------------------------------------------------------------
+BACKLASH = "backlash.campaign:"
+
+# --- torino-compliance ---------------------------------------------------------------------------
+COMPLIANCE = "compliance.campaign:"
+
+
+def variant(index, **factors):
+    """Scale numbers of one reading of the table."""
+
+    def change(variants):
+        changed = list(variants)
+        values = {name: factor * getattr(changed[index], name) for name, factor in factors.items()}
+        changed[index] = replace(changed[index], **values)
+        return changed
+
+    return (COMPLIANCE + "_checks", given(change))
+
+
+# --- low-fidelity --------------------------------------------------------------------------------
+def wrong_low(signal, factor):
+    """Scale a signal of the reduced-order model."""
+
+    def wrapper(function):
+        def wrong(*arguments, **options):
+            good = function(*arguments, **options)
+            name = good.signals[signal]
+            return replace(good, low={**good.low, name: factor * good.low[name]})
+
+        return wrong
+
+    return ("low_fidelity:compare", wrapper)
+
+
+# --- torino-validation ---------------------------------------------------------------------------
+def bench_and_model(backlash=0.3667, growth=1.0, percent=(), **facts):
+    """Return the checks of a model that agrees with the bench, but for what is wrong."""
+    from elevon.reproduce.torino_bench import validation as module
+
+    wrong, rows, places = dict(percent), [], []
+    for number, reading in enumerate(module.READINGS):
+        for signal in module.SHOWS:
+            rms = 1e-3 * growth**number
+            rows.append(
+                module.ValidationRow(reading, signal, rms, wrong.get(signal, 0.2), 1, "rad")
+            )
+        printed = module.PRINTED[reading]
+        good = {"model_lost_deg": printed, "bench_flat_s": 0.3, "model_flat_s": 0.3,
+                "fitted_amplitude_deg": 7.0, "fitted_frequency_hz": 0.2}  # fmt: skip
+        places.append(module.BacklashFacts(reading, printed, printed, **(good | facts)))
+    return module.TorinoValidation(rows, places, backlash, "high", 0, "", [], 0.0045).checks
+
+
+# --- nasa-current --------------------------------------------------------------------------------
+def current(count=32, nominal=7.0, jam=8.0):
+    """Return the checks of runs with these errors."""
+    from elevon.reproduce.nasa.current import CurrentResult
+
+    rows = [SimpleNamespace(state="nominal", percent_rms=nominal)] * count
+    rows += [SimpleNamespace(state="jam", percent_rms=jam)] * 10
+    return CurrentResult(rows, [], 0, "").checks
+
+
+# --- nasa-thermal --------------------------------------------------------------------------------
+THERMAL = "nasa.thermal:"
+
+
+class Altered:
+    """A recording of which one channel reads otherwise."""
+
+    def __init__(self, recording, name, change):
+        self._recording, self._name, self._change = recording, name, change
+        self.meta = recording.meta
+
+    def __getitem__(self, name):
+        channel = self._recording[name]
+        if name != self._name:
+            return channel
+        return SimpleNamespace(time=channel.time, values=self._change(channel.values))
+
+
+def hour(name, change, check="_trend_checks"):
+    """Let one channel of the hour read otherwise."""
+    return (THERMAL + check, given(lambda run: Altered(run, name, change)))
+
+
+def slower(values):
+    """Turn the rise round."""
+    return values[0] + values[0] - values
+
+
+def fading(values):
+    """Let the rise end with the step of the load, in the middle of the hour."""
+    bend = len(values) // 2
+    late = values[bend] + 1e-3 * (values[bend:] - values[bend])
+    return np.concatenate([values[:bend], late])
+
+
+def dema(place, change):
+    """Change what the fit of the bench is judged by: rows, measured, model, truth."""
+    return ("nasa.dema:_checks", given(change, place))
+
+
+def one_wrong(rows):
+    """Return the rows with one value recovered 10 % off."""
+    return [replace(rows[0], recovered=1.1 * rows[0].put_in), *rows[1:]]
+
+
+def raised(row, by, last=None):
+    """Return a change that raises a row of temperatures, all of it or its last samples."""
+
+    def change(values):
+        higher = np.array(values)
+        higher[row, last:] += by
+        return higher
+
+    return change
+
+
+# --- nasa-baseline -------------------------------------------------------------------------------
+def cells(**wrong):
+    """Return rows of the whole matrix whose current rises with the load; `wrong` by measure."""
+    rows = []
+    for profile, load in baseline_matrix():
+        values = dict.fromkeys(MEASURES, 0.1) | {"rms_current_a": 0.5 + 6e-4 * abs(load)}
+        if load == wrong.get("load", load):
+            values |= {k: v for k, v in wrong.items() if k in MEASURES}
+        rows.append(BaselineRow(profile, load, "ok", "", (tuple(values.values()),) * 2))
+    return rows
+
+
+def baseline(rows=None, coverage=None):
+    """Return the checks of rows, and of intervals that hold known effects so often."""
+    from elevon.actuator import Actuator
+    from elevon.reproduce.nasa import baseline as module
+
+    chosen = cells() if rows is None else rows
+    checks = module._checks(chosen, Actuator.load("nasa-ballscrew"))
+    checks += module._order_checks(chosen)
+    place = ("nasa.baseline:coverage", lambda function: lambda *a, **k: coverage or (0.95, 0.1))
+    with patched(place):
+        return checks + module._effects(chosen, 2, 0)[1]
+
+
+def refused():
+    """Return the rows with one cell that did not run."""
+    return [replace(cells()[0], status="refused", runs=()), *cells()[1:]]
+
+
+# --- nasa-separation -----------------------------------------------------------------------------
+def separation(rate=0.01, tables=0.02, half=(0.5,), impact=1.0):
+    """Return the checks of a table with these shares, effects of half severity and impacts."""
+    from elevon.reproduce.nasa.features import FEATURES
+    from elevon.reproduce.nasa.impact import GAP, LOADED, UNLOADED, impact_checks
+    from elevon.reproduce.nasa.separation import _checks
+
+    rows = [
+        SimpleNamespace(effect=SimpleNamespace(size=1.0, significant=True),
+                        half=SimpleNamespace(size=size))
+        for size in half
+    ]  # fmt: skip
+    noise = np.random.default_rng(0).normal(size=(20, len(FEATURES)))
+    simulated = {}
+    for load, strong, weak in (
+        (UNLOADED, "triangular", "trapezoidal"),
+        (LOADED, "trapezoidal", "triangular"),
+    ):
+        simulated[strong, load] = {"healthy": noise, GAP: noise + 2.0 * impact + 0.1 * noise}
+        simulated[weak, load] = {"healthy": noise, GAP: noise + 1.0}
+    return [*_checks(rows, rate, tables), *impact_checks(simulated)]
+
+
+# --- pisa ----------------------------------------------------------------------------------------
+FUNCTIONAL = partial(with_error, "pisa-functional", fidelity="low")
+FRICTION = partial(with_error, "pisa-friction")
+VALIDATION = partial(with_error, "pisa-validation")
+
+
+def recovered(*kinds):
+    """Let quantities of these kinds be recovered 5 % too large."""
+
+    def change(rows):
+        return [
+            replace(row, recovered=1.05 * row.put_in) if row.quantity.startswith(kinds) else row
+            for row in rows
+        ]
+
+    return ("pisa_friction:_checks", given(change))
+
+
+def hydraulic(electric=0.0, winding=0.0, oil=100.0):
+    """Return the checks of two temperatures between which the speeds differ by so many percent."""
+    from elevon.reproduce.hydraulic import HydraulicRow, _checks
+
+    rows = [
+        HydraulicRow(20.0 + 50.0 * k, 1.0, "retraction", 40.0 + 0.4 * k * oil,
+                     40.0 + 0.4 * k * electric, 40.0 + 0.4 * k * winding, 1.0, 1.0)
+        for k in (0, 1)
+    ]  # fmt: skip
+    return _checks(rows)
+
+
+def failures(safe=True, listed=False, missing=0):
+    """Return the checks of two rows, the last one so."""
+    from elevon.reproduce.pisa_failures import FailureRow, failure_checks
+
+    row = FailureRow("x", "y", "locked", "locked", True, "-", None, "", False, 0.0)
+    return failure_checks([row, replace(row, safe=safe, listed=listed)], 2 + missing)
+
+
+# --- cranfield -----------------------------------------------------------------------------------
+def cranfield(alarms=2, **wrong):
+    """Return the checks of a folder with good figures, but for those that are wrong."""
+    from elevon.reproduce.cranfield.detection import Detection
+    from elevon.reproduce.cranfield.result import LIMITS, CranfieldResult
+
+    headline = dict.fromkeys(LIMITS, 0.99) | wrong
+    return CranfieldResult(
+        None, headline=headline, detections=[Detection("normal", alarms, 40, None)]
+    ).checks
+
+
+#: Cases whose checks need minutes or seconds of simulation.
+LONG = {"torino-backlash", "low-fidelity", "nasa-thermal", "pisa-functional", "pisa-friction",
+        "pisa-validation"}  # fmt: skip
+
+GOOD = {
+    "torino-backlash": partial(with_error, "torino-backlash"),
+    "torino-compliance": partial(with_error, "torino-compliance", resamples=20),
+    "low-fidelity": partial(with_error, "low-fidelity"),
+    "torino-validation": bench_and_model,
+    "nasa-current": current,
+    "nasa-thermal": partial(with_error, "nasa-thermal"),
+    "nasa-baseline": baseline,
+    "nasa-separation": separation,
+    "pisa-functional": FUNCTIONAL,
+    "pisa-friction": FRICTION,
+    "pisa-hydraulic": hydraulic,
+    "pisa-validation": VALIDATION,
+    "pisa-failures": failures,
+    "cranfield": cranfield,
+}
+
+
+def error(case, *places):
+    """Return what makes the checks of a case with an error."""
+    return partial(GOOD[case], *places)
+
+
+_B, _C, _T = (
+    partial(error, f"{name}") for name in ("torino-backlash", "torino-compliance", "nasa-thermal")
+)
+
+#: Case and check, as `cases.toml` names it, to the checks with an error that this one must see.
+PLANTED = {
+    ("torino-backlash", "row *: recovered less put in"):
+        _B((BACKLASH + "backlash_from_encoder", scaled(1.05, "loop_gain"))),
+    ("torino-backlash", "largest: motor minus encoder less put in"):
+        _B((BACKLASH + "lost_motion", scaled(1.001, 1))),
+    ("torino-backlash", "centre distances from the micrometer"):
+        _B((BACKLASH + "centre_distance", given(lambda reading: reading + 0.1))),
+    ("torino-backlash", "printed formula column from the geometry"):
+        _B((BACKLASH + "formula_deg", scaled(1.01))),
+    ("torino-compliance", "load on loss, printed rows, from 68.16"):
+        _C(variant(0, load_on_loss=1.001)),
+    ("torino-compliance", "loss on load, printed rows, from 114.6"):
+        _C(variant(0, loss_on_load=1.001)),
+    ("torino-compliance", "published 68.23 from losses of the rows' own positions"):
+        _C(variant(1, load_on_loss=1.001)),
+    ("torino-compliance", "load on loss, repaired, from 85.7"): _C(variant(-1, load_on_loss=1.002)),
+    ("torino-compliance", "loss on load, repaired, from 113.4"):
+        _C(variant(-1, loss_on_load=1.002)),
+    ("torino-compliance", "ratio of the two regressions less r squared"):
+        _C(variant(0, r2=1.0 + 1e-6)),
+    ("torino-compliance", "rows called wrong by only one of program and eye"):
+        _C((COMPLIANCE + "_checks", given(lambda slips: slips[1:], 1))),
+    ("low-fidelity", "*: position"): error("low-fidelity", wrong_low("position", 1.02)),
+    ("low-fidelity", "*: q current"): error("low-fidelity", wrong_low("q_current", 1.1)),
+    ("torino-validation", "*mm: * position"):
+        partial(bench_and_model, percent={"encoder_position": 1.2}),
+    ("torino-validation", "*mm: motor speed"):
+        partial(bench_and_model, percent={"motor_speed": 2.5}),
+    ("torino-validation", "calibrated backlash less the printed one"):
+        partial(bench_and_model, backlash=0.38),
+    ("torino-validation", "*mm: lost motion of the model less the printed backlash"):
+        partial(bench_and_model, model_lost_deg=0.4),
+    ("torino-validation", "*mm: standstill of model less bench"):
+        partial(bench_and_model, model_flat_s=0.32),
+    ("torino-validation", "*mm: fitted amplitude less the commanded one"):
+        partial(bench_and_model, fitted_amplitude_deg=7.1),
+    ("torino-validation", "*mm: fitted frequency less the commanded one"):
+        partial(bench_and_model, fitted_frequency_hz=0.201),
+    ("torino-validation", "encoder error, largest over least backlash"):
+        partial(bench_and_model, growth=1.5),
+    ("nasa-current", "nominal runs"): partial(current, count=31),
+    ("nasa-current", "nominal: average error of the current"): partial(current, nominal=10.1),
+    ("nasa-current", "jam: average error of the current"): partial(current, jam=10.1),
+    ("nasa-thermal", "steady state less the algebraic root"):
+        _T((THERMAL + "steady_state", given(lambda actuator: actuator.with_values(
+            {"thermal.convection": 1.1 * actuator.parameters.value("thermal.convection")})))),
+    ("nasa-thermal", "one hour without radiation less the closed form, *"):
+        _T((THERMAL + "closed_form", scaled(1.01, 1))),
+    ("nasa-thermal", "heat in less heat stored and given away"):
+        _T(hour("energy_air", lambda values: 1.001 * values, "_energy_check")),
+    ("nasa-thermal", "slowest rise of the surface"): _T(hour("surface_temperature", slower)),
+    ("nasa-thermal", "winding less surface"): _T(hour("winding_temperature", lambda v: v - 50.0)),
+    ("nasa-thermal", "* rises faster after the load's step"):
+        _T(hour("winding_temperature", fading)),
+    ("nasa-thermal", "fit of a hidden bench: largest error of the surface"):
+        _T(dema(1, raised(0, 2.0, -5))),
+    ("nasa-thermal", "fit of a hidden bench: rms error of the surface"):
+        _T(dema(1, raised(0, 0.6))),
+    ("nasa-thermal", "fit of a hidden bench: largest error of a recovered value"):
+        _T(dema(0, one_wrong)),
+    ("nasa-thermal", "fit of a hidden bench: winding, which is not measured"):
+        _T(dema(3, raised(2, 2.0))),
+    ("nasa-baseline", "cells that were refused"): lambda: baseline(refused()),
+    ("nasa-baseline", "largest rms phase current"): lambda: baseline(cells(rms_current_a=8.0)),
+    ("nasa-baseline", "largest tracking error of a ramp"):
+        lambda: baseline(cells(tracking_max_mm=11.0)),
+    ("nasa-baseline", "largest rms tracking error of a sine"):
+        lambda: baseline(cells(tracking_rms_mm=0.4)),
+    ("nasa-baseline", "rms current, compressive against tensile"):
+        lambda: baseline(cells(rms_current_a=1.2, load=500.0)),
+    ("nasa-baseline", "loads whose increase does not raise the current"):
+        lambda: baseline(cells(rms_current_a=0.1, load=4500.0)),
+    ("nasa-baseline", "known effects held by their intervals, at *"):
+        lambda: baseline(coverage=(0.8, 0.1)),
+    ("nasa-baseline", "known effects: mean error over its deviation"):
+        lambda: baseline(coverage=(0.95, 0.4)),
+    ("nasa-separation", "healthy against healthy: *"): partial(separation, rate=0.1),
+    ("nasa-separation", "faults of half severity that rank above the whole"):
+        partial(separation, half=(0.5, 1.2)),
+    ("nasa-separation", "rows in which half the severity was compared"):
+        partial(separation, half=()),
+    ("nasa-separation", "gap at * N: impact, *"): partial(separation, impact=0.4),
+    ("pisa-functional", "cycle, nominal (*"): error(
+        "pisa-functional", ("pisa_functional:stroke_time", scaled(1.6))),
+    ("pisa-functional", "cycle, normal (*"): error(
+        "pisa-functional", ("pisa_functional:stroke_time", scaled(1.6))),
+    ("pisa-functional", "cycle, critical (*"): error(
+        "pisa-functional", ("pisa_functional:stroke_time", scaled(3.0))),
+    ("pisa-friction", "mass: worst error over the largest"):
+        error("pisa-friction", recovered("mass")),
+    ("pisa-friction", "mean friction, FF*: worst error over the largest"):
+        error("pisa-friction", recovered("friction_ff")),
+    ("pisa-friction", "harmonics, FF*: worst error over the largest"):
+        error("pisa-friction", recovered("harmonic")),
+    ("pisa-friction", "efficiency at the preload: worst error over the largest"):
+        error("pisa-friction", recovered("preload_efficiency")),
+    ("pisa-friction", "efficiency over load: worst error over the largest"):
+        error("pisa-friction", recovered("efficiency")),
+    ("pisa-hydraulic", "retraction, spread of the controlled speed"):
+        partial(hydraulic, electric=6.0),
+    ("pisa-hydraulic", "the same with the winding's temperature alone"):
+        partial(hydraulic, winding=6.0),
+    ("pisa-hydraulic", "retraction, spread of the hydraulic speed"):
+        partial(hydraulic, electric=4.0, oil=2.0),
+    ("pisa-validation", "*: position"): error(
+        "pisa-validation", ("elevon.calibrate.replay:as_recorded", scaled(1.1))),
+    ("pisa-failures", "unsafe rows outside the listed set"): partial(failures, safe=False),
+    ("pisa-failures", "listed rows that are safe"): partial(failures, listed=True),
+    ("pisa-failures", "rows, one a fault, place, severity and phase"): partial(failures, missing=1),
+    ("cranfield", "mean macro-F1 of three classes at a load left out"):
+        partial(cranfield, three_class_macro_f1_mean=0.8),
+    ("cranfield", "worst load's macro-F1 of three classes"):
+        partial(cranfield, three_class_macro_f1_worst=0.5),
+    ("cranfield", "worst load's accuracy of four families"):
+        partial(cranfield, four_family_grouped_accuracy_worst=0.9),
+    ("cranfield", "false-alarm rate, lower end of its interval"): partial(cranfield, alarms=20),
+}  # fmt: skip
