@@ -119,6 +119,26 @@ BENCHES = {
 }
 
 
+def test_a_worn_day_is_named_and_its_answer_read_back(tmp_path):
+    """The cheap form of the ten lines: the rotary unit at low fidelity, its own values."""
+    days = {"new": [], "worn": ["backlash@transmission=0.1 deg"]}
+    logs = [
+        elevon.bench("chirp", "torino-rotary", tmp_path / name, faults=faults, fidelity="low").paths
+        for name, faults in days.items()
+    ]
+    answer = elevon.diagnose(logs[1], "torino-rotary", baselines=logs[0])
+    assert answer.best == ("backlash@transmission",)
+    assert elevon.load(answer.save(tmp_path / "answer.json")) == answer
+
+
+#: What every result of the ten lines must bear, and the answers in one line.
+_READ_BACK = """
+for number, result in enumerate((fitted, *(answer for _, answer in history))):
+    assert elevon.load(result.save(f"{number}.json")) == result
+print(*(answer.status for _, answer in history), *answer.best)
+"""
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("unit", BENCHES)
 def test_from_logs_to_an_answer(unit, tmp_path):
@@ -130,7 +150,7 @@ def test_from_logs_to_an_answer(unit, tmp_path):
         code = code.replace(old, new)
     if unit != "torino-rotary":  # the mission is the rotary unit's
         code = "\n".join(line for line in code.splitlines() if "elevon.predict" not in line)
-    code += "\nprint(*(a.status for _, a in history), *(history[1][1].best))"
+    code += _READ_BACK
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
