@@ -67,6 +67,21 @@ def bench_and_model(backlash=0.3667, growth=1.0, percent=(), **facts):
     return module.TorinoValidation(rows, places, backlash, "high", 0, "", [], 0.0045).checks
 
 
+# --- torino-loaded -------------------------------------------------------------------------------
+def campaign(constant=1.4, **wrong):
+    """Return the checks of a campaign on the line, but for one test in which something is wrong."""
+    from elevon.reproduce.torino_bench import loaded as module
+
+    rows = []
+    for net in module.NET:
+        lost = np.degrees(net) + 0.3656
+        for torque in np.linspace(module.LEAST, module.MOST, 10):
+            current = 0.2 + torque / 1.4
+            rows.append(module.LoadedRow(net, torque, torque, current, lost, lost, 0.1))
+    rows[4] = replace(rows[4], **wrong)
+    return module.LoadedCampaign(rows, constant, 0.3656, 0.0045, "low", 0, "").checks
+
+
 # --- nasa-current --------------------------------------------------------------------------------
 def current(count=32, nominal=7.0, jam=8.0):
     """Return the checks of runs with these errors."""
@@ -245,6 +260,7 @@ GOOD = {
     "torino-compliance": partial(with_error, "torino-compliance", resamples=20),
     "low-fidelity": partial(with_error, "low-fidelity"),
     "torino-validation": bench_and_model,
+    "torino-loaded": campaign,
     "nasa-current": current,
     "nasa-thermal": partial(with_error, "nasa-thermal"),
     "nasa-baseline": baseline,
@@ -308,6 +324,14 @@ PLANTED = {
         partial(bench_and_model, fitted_frequency_hz=0.201),
     ("torino-validation", "encoder error, largest over least backlash"):
         partial(bench_and_model, growth=1.5),
+    ("torino-loaded", "brake torque by the cell less its place on the line"):
+        partial(campaign, cell_nm=1.2),
+    ("torino-loaded", "torque an ampere balances, less the calibrated constant"):
+        partial(campaign, constant=1.5),
+    ("torino-loaded", "lost motion of the * beyond 2 % of the backlash"):
+        partial(campaign, model_lost_deg=0.4),
+    ("torino-loaded", "position of model less bench, worst test"):
+        partial(campaign, position_percent=1.5),
     ("nasa-current", "nominal runs"): partial(current, count=31),
     ("nasa-current", "nominal: average error of the current"): partial(current, nominal=10.1),
     ("nasa-current", "jam: average error of the current"): partial(current, jam=10.1),

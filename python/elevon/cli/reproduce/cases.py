@@ -190,6 +190,17 @@ CASES = (
         options={"fidelity": (_FIDELITY, "high")},
     ),
     PublishedCase(
+        "torino-loaded",
+        "Run the loaded campaign, a constant brake torque a test, and predict each test.",
+        "thirty logs of the bench",
+        _R + "torino_bench.loaded:reproduce_loaded",
+        ("net_backlash_rad", "set_nm", "cell_nm", "current_a", "bench_lost_deg", "model_lost_deg",
+         "position_percent"),
+        "each test after its first period",
+        page=_R + "torino_bench.loaded_page:loaded_page",
+        options={"fidelity": (_STAND, "high")},
+    ),
+    PublishedCase(
         "nasa-current",
         "Predict the motor current of 32 nominal and ten jammed runs of a mismatched stand.",
         "running and predicting 42 experiments",

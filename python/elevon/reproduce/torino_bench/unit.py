@@ -45,12 +45,17 @@ def calibration_steps() -> list[dict[str, Any]]:
     ]
 
 
+def procedure_of(name: str, steps: Sequence[Mapping[str, Any]]) -> Procedure:
+    """Return a procedure of steps."""
+    return validated(Procedure, {"name": name, "step": list(steps)}, Document(name, "", {}))
+
+
 def bench_logs(
-    name: str,
-    steps: Sequence[Mapping[str, Any]],
+    procedure: Procedure,
     unit: Actuator,
     *,
     seed: int,
+    fidelity: str = "high",
     progress: Progress | None = None,
 ) -> list[Log]:
     """Return what the bench records of a procedure on a unit.
@@ -66,11 +71,10 @@ def bench_logs(
     from elevon.scenario.compile import signal_records
     from elevon.simulate import Run, simulate_batch
 
-    procedure = validated(Procedure, {"name": name, "step": list(steps)}, Document(name, "", {}))
     ready = setups(procedure, unit, seed=seed)
     runs = [Run(s.actuator, s.scenario, s.conditions.seed, s.trace.name) for s in ready]
-    record = recorded(list(signal_records(unit.wiring, "high")))
-    recordings = simulate_batch(runs, fidelity="high", record=record, progress=progress)
+    record = recorded(list(signal_records(unit.wiring, fidelity)))
+    recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
     for run in recordings:
         if run.status != "ok":
             raise SimulationError(f"{run.meta['label']}: {run.meta['message']}", run.status)

@@ -29,6 +29,7 @@ from elevon.reproduce.torino_bench.unit import (
     bench_logs,
     calibration_steps,
     micrometer,
+    procedure_of,
     trace,
 )
 
@@ -163,11 +164,9 @@ def reproduce_torino_validation(
     for reading in READINGS:
         name = f"at-{reading:g}-mm".replace(".", "-")
         steps += [micrometer(reading), trace(name, SINE, DURATION)]
-    first = bench_logs("calibration", calibration_steps(), unit, seed=seed,
-                       progress=part(progress, 0.0, 0.25))  # fmt: skip
-    judged = bench_logs(
-        "validation", steps, unit, seed=seed + 1, progress=part(progress, 0.25, 0.5)
-    )
+    procedures = procedure_of("calibration", calibration_steps()), procedure_of("validation", steps)
+    first = bench_logs(procedures[0], unit, seed=seed, progress=part(progress, 0.0, 0.25))
+    judged = bench_logs(procedures[1], unit, seed=seed + 1, progress=part(progress, 0.25, 0.5))
     model = calibrate(first, base, progress=part(progress, 0.5, 0.7)).actuator
     count = encoder_count(base)
     curves, rows, facts = [], [], []
