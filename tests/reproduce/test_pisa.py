@@ -14,18 +14,19 @@ from elevon.reproduce.pisa_pages import functional_report, hydraulic_report
 
 
 def test_functional_runs_meet_their_requirements() -> None:
-    """Six conditions; the limit one has no requirement and no say in the status."""
+    """Conditions and P's own figures; the limit one has no requirement and no say in the status."""
     result = reproduce_functional(fidelity="low")
     values = result.to_dict()
     assert values["status"] == "pass"
     assert [row["condition"] for row in values["rows"]] == [
-        "nominal", "normal", "normal", "critical", "critical", "limit"]  # fmt: skip
-    assert len(values["checks"]) == 5
-    limit = values["rows"][-1]
+        "nominal", "normal", "normal", "critical", "critical", "limit",
+        "normal, as Figs. 3.11 to 3.16"]  # fmt: skip
+    assert len(values["checks"]) == 6 + 4 * 6
+    limit, others = values["rows"][5], [*values["rows"][:5], values["rows"][6]]
     assert limit["passed"] is None
     assert limit["requirement_s"] is None
     # 14 V cannot reach the high speed in retraction: slower than every other condition.
-    assert limit["retraction_s"] > 1.2 * max(row["retraction_s"] for row in values["rows"][:-1])
+    assert limit["retraction_s"] > 1.2 * max(row["retraction_s"] for row in others)
     assert "limit" in functional_report(result, date="2000-01-01").html().lower()
 
 
@@ -80,5 +81,7 @@ def test_hydraulic_speed_follows_load_and_temperature() -> None:
     assert ideal.viscosity(40.0) == pytest.approx(14e-6, rel=1e-9)
     assert ideal.viscosity(100.0) == pytest.approx(5e-6, rel=1e-9)
     result = reproduce_hydraulic()
-    assert result.to_dict()["status"] == "pass"
+    # In extension nothing brakes the overshoot at 1 g before mid-stroke: over the limit, and said.
+    failed = [check.name for check in result.checks if not check.passed]
+    assert failed == ["extension, spread of the controlled speed"]
     assert hydraulic_report(result, date="2000-01-01").html()

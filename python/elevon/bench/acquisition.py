@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.stand import ChannelSpec, Stand
 from elevon.errors import InputError
@@ -20,16 +21,27 @@ _MOST = 3e6  # samples of a channel
 _OVER = 4.0  # ... and this many times the log's rate
 _CUTOFF = 0.4  # of the log's rate
 _ORDER = 4
+_FITTED = {"vibration": "vibration.model"}
 _DIGITAL = ("command", "_ref")
 
 
-def acquired_signals(wiring: str, fidelity: str, stand: Stand) -> dict[str, str]:
-    """Return role to signal, of the stand's channels that the model has; the sensor's, if any."""
+def acquired_signals(actuator: Actuator, fidelity: str, stand: Stand) -> dict[str, str]:
+    """Return role to signal, of the stand's channels that the model has; the sensor's, if any.
+
+    A sensor that is not fitted has no channel: its recorder's noise would pass for a signal.
+    """
     from elevon.scenario.compile import signal_records
 
-    by_role = {item["role"]: name for name, item in signal_records(wiring, fidelity).items()}
-    roles = [role for role in stand.channels if role != "load"]
+    records = signal_records(actuator.wiring, fidelity)
+    by_role = {item["role"]: name for name, item in records.items()}
+    roles = [role for role in stand.channels if role != "load" and _fitted(actuator, role)]
     return {role: by_role[role] for role in roles if role in by_role}
+
+
+def _fitted(actuator: Actuator, role: str) -> bool:
+    path = _FITTED.get(role)
+    known = actuator.parameters
+    return path is None or path not in known or known[path].value != "off"
 
 
 def internal_steps(rate: float, step: float, duration: float = 1.0) -> int:

@@ -218,7 +218,7 @@ def run_loaded_batch(
     rate, first = rates.pop(), setups[0]
     step = solver_step(first.actuator, fidelity)
     steps = internal_steps(rate, step, max(s.scenario.seconds for s in setups))
-    roles = acquired_signals(first.actuator.wiring, fidelity, first.stand)
+    roles = acquired_signals(first.actuator, fidelity, first.stand)
     record = f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz"
     forces = _forces(setups)
     runs = _simulated(setups, [s for _, _, s in forces], fidelity, record, progress)

@@ -15,6 +15,8 @@ from elevon.diagnose.engine.reading import ReplayUnit
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 from elevon.diagnose.positions.reading import PositionReading
 from elevon.diagnose.roles.log import role_log
+from elevon.diagnose.vibration.answer import diagnose_spall
+from elevon.diagnose.vibration.reading import KIND, shows_passes
 from elevon.errors import InputError
 from elevon.experiment import Variant
 from elevon.threads import one_blas_thread
@@ -72,6 +74,9 @@ def diagnose(
     """
     begin = clock.perf_counter()
     check_request(logs, false_alarm)
+    heard, notes = _heard(logs, actuator, faults, false_alarm, alone=not baselines)
+    if heard is not None:
+        return replace(heard, seconds=clock.perf_counter() - begin)
     candidates = chosen(faults, actuator)
     healthy = [reading_of(log, actuator) for log in baselines]
     cases = [case_of(reading_of(log, actuator), candidates, healthy, spread) for log in logs]
@@ -79,7 +84,32 @@ def diagnose(
     if spread is not None:
         result = replace(result, findings=(*result.findings, spread.threshold_text(false_alarm)))
     blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
-    return replace(result, unobservable=blind, seconds=clock.perf_counter() - begin)
+    findings = (*result.findings, *notes)
+    return replace(
+        result, unobservable=blind, findings=findings, seconds=clock.perf_counter() - begin
+    )
+
+
+def _heard(
+    logs: Sequence[Log],
+    actuator: Actuator,
+    faults: Sequence[str] | None,
+    rate: float,
+    *,
+    alone: bool,
+) -> tuple[Diagnosis | None, tuple[str, ...]]:
+    """What an accelerometer hears, which the reduced-order model has not.
+
+    With baselines, by which the other channels are judged after it, at half of the false alarms.
+    None where no log has one, or no spall is a candidate.
+    """
+    wanted = faults is None or any(text.startswith(f"{KIND}@") for text in faults)
+    if not wanted or not all(shows_passes(log, actuator) for log in logs):
+        return None, ()
+    try:
+        return diagnose_spall(logs, actuator, rate if alone else 0.5 * rate, alone=alone)
+    except ValueError as error:
+        return None, (f"accelerometer: {error}",)
 
 
 def check_request(logs: Sequence[Log], rate: float) -> None:

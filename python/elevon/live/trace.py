@@ -109,7 +109,7 @@ def trace_signals(actuator: Actuator, fidelity: str) -> list[str]:
     """Return the model's signals from which a log is written."""
     stand = stand_of(actuator.wiring)
     if stand.equipment != "rotary":
-        return list(acquired_signals(actuator.wiring, fidelity, stand).values())
+        return list(acquired_signals(actuator, fidelity, stand).values())
     known = signal_records(actuator.wiring, fidelity)
     wanted = [name for names in _DRIVE.values() for name in names]
     wanted += [_voltage(actuator), "brake_torque", "motor_speed"]
@@ -182,7 +182,7 @@ def _cell(stretch: Stretch, rig: BrakeRig) -> tuple[Floats, Floats]:
 def _recorder(
     path: Path, stretch: Stretch, actuator: Actuator, fidelity: str, stand: Stand, *, force: bool
 ) -> list[Path]:
-    roles = acquired_signals(actuator.wiring, fidelity, stand)
+    roles = acquired_signals(actuator, fidelity, stand)
     units = signal_records(actuator.wiring, fidelity)
     present = {role: name for role, name in roles.items() if name in stretch.signals}
     time = stretch.time - stretch.time[0]

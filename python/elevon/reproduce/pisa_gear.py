@@ -23,24 +23,45 @@ RECORD = (
 )
 
 
+RELAXED = 40.0
+"""Cycle that P allows in the critical condition [s]: twice that of the others."""
+
+
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """One condition of P Table 1.2; the requirement is on both strokes together."""
+    """One condition of P Table 1.2; the requirement is on both strokes together.
+
+    Attributes
+    ----------
+    name : str
+        As printed.
+    load_factor, supply : float
+        N_z and V.
+    requirement : float or None
+        Cycle allowed [s].
+    """
 
     name: str
     load_factor: float
     supply: float
     requirement: float | None
 
+    @property
+    def held(self) -> bool:
+        """Whether the set points are to be held: where P doubles the cycle, it lets them go."""
+        return self.requirement is not None and self.requirement < RELAXED
+
 
 CONDITIONS = (
     Condition("nominal", 1.0, 28.0, 20.0),
     Condition("normal", 1.5, 22.0, 20.0),
     Condition("normal", 1.5, 30.3, 20.0),
-    Condition("critical", 3.5, 20.5, 40.0),
-    Condition("critical", 3.5, 32.2, 40.0),
+    Condition("critical", 3.5, 20.5, RELAXED),
+    Condition("critical", 3.5, 32.2, RELAXED),
     Condition("limit", 3.5, 14.0, None),
 )
+FIGURES = Condition("normal, as Figs. 3.11 to 3.16", 1.0, 22.0, 20.0)
+"""What P 3.3.1 says of its own figures; Table 1.2, the abstract and 3.1 have 1.5 g at 22 V."""
 
 
 @dataclass(frozen=True, slots=True)

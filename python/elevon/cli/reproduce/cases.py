@@ -83,9 +83,13 @@ def _show_compliance(values: Values, _result: Any) -> None:
 
 def _show_current(values: Values, _result: Any) -> None:
     rows = [
-        [state, source, *(f"{item[source][key]:.2f}" for key in ("average", "maximum", "minimum"))]
+        [
+            state,
+            source.replace("_", " "),
+            *(f"{item[source][key]:.2f}" for key in ("average", "maximum", "minimum")),
+        ]
         for state, item in values["summary"].items()
-        for source in ("published", "here")
+        for source in ("published", "here", "here_between_corners")
     ]
     print_table(["runs", "source", "average %", "maximum %", "minimum %"], rows)
 
@@ -242,10 +246,11 @@ CASES = (
     PublishedCase(
         "pisa-functional",
         "Extend and retract the landing gear in every condition of the thesis.",
-        "simulating 12 strokes",
+        "simulating 14 strokes",
         _R + "pisa_functional:reproduce_functional",
         ("condition", "nz", "supply_v", "extension_s", "retraction_s", "cycle_s",
-         "peak_current_a", "requirement_s", "passed"),
+         "extension_high_rad_s", "extension_low_rad_s", "retraction_high_rad_s",
+         "retraction_low_rad_s", "requirement_s", "passed"),
         "landing gear, one stroke in each direction",
         page=_R + "pisa_pages:functional_report",
         options={"fidelity": (_FIDELITY, "high")},
@@ -275,7 +280,8 @@ CASES = (
         "Predict position, speed and current of both strokes of a mismatched rig, percent errors.",
         "ten strokes on the virtual rig",
         _R + "pisa_validation:reproduce_validation",
-        ("stroke", "signal", "rms", "unit", "percent_of_rms", "percent_of_range", "published"),
+        ("stroke", "signal", "held_out", "percent_of_rms", "judged_percent", "before_percent",
+         "floor_percent", "limit_percent"),
         "model less virtual rig; the thesis prints no error",
         page=_R + "pisa_validation_page:validation_page",
         options={"fidelity": (_FIDELITY, "high")},

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
@@ -25,6 +26,8 @@ PUBLISHED = {"nominal": (7.12, 9.96, 5.82), "jam": (8.34, 9.88, 5.60)}
 """Percent RMS error of the current as printed: average, maximum, minimum."""
 REASSEMBLIES = 4
 SECONDS = 9.0
+CORNER = 0.1
+"""Seconds after a corner of the command in which the current may stand at its limit."""
 SETTLED = 3.0
 """What comes before is left out [s]: the stand waits up to 2 s."""
 PROFILES = {
@@ -52,13 +55,25 @@ FIGURES = {
 
 @dataclass(frozen=True, slots=True)
 class CurrentRow(Plain):
-    """One experiment: what was run, and the RMS error in percent of the measured current's RMS."""
+    """One experiment: what was run, and the RMS error in percent of the measured current's RMS.
+
+    Attributes
+    ----------
+    percent_rms : float
+        RMS error over the RMS of the measured current about its mean.
+    percent_between_corners : float
+        The same without what follows a corner of the command within `CORNER`: there the current
+        goes to its limit for milliseconds.
+    rms_a : float
+        RMS error [A].
+    """
 
     state: str
     assembly: int
     profile: str
     load: str
     percent_rms: float
+    percent_between_corners: float
     rms_a: float
 
 
@@ -82,19 +97,20 @@ class CurrentResult:
     seed: int
     parameter_hash: str
 
-    def summary(self, state: str) -> tuple[float, float, float]:
-        """Return average, maximum and minimum of the percent errors."""
-        values = [row.percent_rms for row in self.rows if row.state == state]
+    def summary(self, state: str, name: str = "percent_rms") -> tuple[float, float, float]:
+        """Return average, maximum and minimum of the percent errors of one definition."""
+        values = [getattr(row, name) for row in self.rows if row.state == state]
         return float(np.mean(values)), max(values), min(values)
 
     @property
     def checks(self) -> list[Check]:
-        """As many runs as published, and no worse on average than the paper's worst."""
+        """As many runs as published; average and maximum against the paper's own."""
         nominal = [row for row in self.rows if row.state == "nominal"]
         checks = [Check("nominal runs", float(len(nominal)), 32.0, "", at_least=True)]
-        for state, (_, most, _) in PUBLISHED.items():
-            name = f"{state}: average error of the current"
-            checks.append(Check(name, self.summary(state)[0], most, "%"))
+        for state, (average, most, _) in PUBLISHED.items():
+            found = self.summary(state)
+            for name, value, limit in (("average", found[0], average), ("largest", found[1], most)):
+                checks.append(Check(f"{state}: {name} error of the current", value, limit, "%"))
         return checks
 
     def to_dict(self) -> dict[str, object]:
@@ -108,6 +124,9 @@ class CurrentResult:
                 state: {
                     "published": dict(zip(names, PUBLISHED[state], strict=True)),
                     "here": dict(zip(names, self.summary(state), strict=True)),
+                    "here_between_corners": dict(
+                        zip(names, self.summary(state, "percent_between_corners"), strict=True)
+                    ),
                 }
                 for state in PUBLISHED
             },
@@ -231,17 +250,40 @@ def _predicted(
         scenario = scenario.with_faults([JAM])
     run = simulate(model, scenario, fidelity="low", record="current_q_meas@every")
     simulated = run["current_q_meas"]
-    predicted = np.interp(time, simulated.time, simulated.values)
+    filtered = _recorded(simulated.time, simulated.values, log.meta["acquisition"]["cutoff_hz"])
+    predicted = np.interp(time, simulated.time, filtered)
     measured = np.asarray(log.role("torque_current").values, dtype=np.float64)
     used = time >= SETTLED
-    rms = float(np.sqrt(np.mean((predicted - measured)[used] ** 2)))
-    percent = 100.0 * rms / float(np.std(measured[used]))
-    row = CurrentRow(state, assembly, profile, load, percent, rms)
+    error, size = predicted - measured, float(np.std(measured[used]))
+    between = used & ~_after_corners(time, np.asarray(command.values))
+    rms, without = (float(np.sqrt(np.mean(error[at] ** 2))) for at in (used, between))
+    row = CurrentRow(
+        state, assembly, profile, load, 100.0 * rms / size, 100.0 * without / size, rms
+    )
     figure = FIGURES.get((state, profile, load))
     if figure is None or assembly > 1:
         return row, None
     title = f"{profile}, {load}" + (", one return channel blocked" if state == "jam" else "")
     return row, CurrentTrace(figure, title, time[used], measured[used], predicted[used])
+
+
+def _after_corners(time: Floats, command: Floats) -> npt.NDArray[np.bool_]:
+    """Tell which instants follow a corner: the slope changes its sign, and by more than a sine's."""
+    slope = np.gradient(command, time)
+    jump = np.abs(np.diff(slope, prepend=slope[0])) > 0.2 * float(np.abs(slope).max())
+    corners = time[jump]
+    if not len(corners):
+        return np.zeros(len(time), dtype=bool)
+    since = time - corners[np.clip(np.searchsorted(corners, time, "right") - 1, 0, None)]
+    return np.asarray((since >= 0.0) & (since < CORNER))
+
+
+def _recorded(time: Floats, values: Floats, cutoff: float) -> Floats:
+    """Return a run's current behind the filter of the stand's recorder: both sides have one."""
+    from scipy.signal import butter, sosfiltfilt
+
+    rate = 1.0 / float(np.median(np.diff(time)))
+    return np.asarray(sosfiltfilt(butter(4, cutoff, fs=rate, output="sos"), values))
 
 
 def _table(time: Any, values: Any) -> dict[str, Any]:

@@ -133,7 +133,7 @@ def reproduce_separation(
     seeded = any(fault.name == GAP for fault in faults)
     impacts = gap_impacts(simulated) if seeded else []
     traces = gap_traces(nominal) if seeded else []
-    checks = [*_checks(rows, rate, tables), *impact_checks(simulated)]
+    checks = [*null_checks(rate, tables, level), *_checks(rows), *impact_checks(simulated)]
     return SeparationResult(rows, impacts, checks, rate, tables, seed, healthy, reassemblies, level,
                             traces, meta)  # fmt: skip
 
@@ -277,14 +277,27 @@ def _null(
     return float(exceeded.mean()), float(exceeded.any(axis=1).mean())
 
 
-def _checks(rows: Sequence[SeparationRow], rate: float, tables: float) -> list[Check]:
-    # One-sided 95 % of the sampling error of a share of one twentieth over the splits.
-    limit = FAMILY + 1.645 * math.sqrt(FAMILY * (1.0 - FAMILY) / SPLITS)
+def null_checks(rate: float, tables: float, level: float) -> list[Check]:
+    """Hold comparisons of healthy with healthy to their own level, and tables to the family's."""
+    return [
+        Check("healthy against healthy: comparisons above the threshold", rate,
+              _sampled(1.0 - level), "1"),
+        Check("healthy against healthy: tables with any", tables, _sampled(FAMILY), "1"),
+    ]  # fmt: skip
+
+
+def _sampled(share: float) -> float:
+    """Return a share plus its one-sided 95 % sampling error over the splits.
+
+    That of whole tables: the comparisons of one table may all go together.
+    """
+    return share + 1.645 * math.sqrt(share * (1.0 - share) / SPLITS)
+
+
+def _checks(rows: Sequence[SeparationRow]) -> list[Check]:
     halved = [row for row in rows if row.half is not None and row.effect.significant]
     wrong = sum(abs(row.half.size) >= abs(row.effect.size) for row in halved if row.half)
     return [
-        Check("healthy against healthy: comparisons above the threshold", rate, limit, "1"),
-        Check("healthy against healthy: tables with any", tables, limit, "1"),
         Check("faults of half severity that rank above the whole", float(wrong), 0.0),
         Check("rows in which half the severity was compared", float(len(halved)), 1.0,
               at_least=True),

@@ -1,0 +1,222 @@
+"""A spall named by an accelerometer: whether, where, how long, how surely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.diagnose.engine.answer import (
+    Cause,
+    Diagnosis,
+    Explanation,
+    FaultPlace,
+    Moved,
+    SuspectedFault,
+)
+from elevon.diagnose.vibration.reading import KIND, PassReading
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.features.envelope import EnvelopeOrders
+    from elevon.logs.log import Log
+
+_SIZES = (1e-4, 2e-4, 3e-4, 4.5e-4, 7e-4, 1e-3, 1.5e-3, 2.2e-3, 3.3e-3, 5e-3)
+"""m; up to where the catalogue ends."""
+_GRID = 400
+_MODEL = 0.1
+"""Deviation of each of the model's lines, as a share of their RMS: the structure; ASSUMED."""
+_MOUNT = 0.15
+"""The same, of all lines alike: how the sensor is mounted; ASSUMED."""
+_PRIOR = 0.02
+"""Of any spall, before the log; ASSUMED."""
+_INTERVAL = (0.05, 0.5, 0.95)
+_NAMED = 0.05  # probability from which on a place is told
+
+
+@dataclass(frozen=True)
+class PassEvidence:
+    """What the logs say together: score, chance and probability by place."""
+
+    scores: dict[str, float]
+    chances: dict[str, float]
+    probabilities: dict[str, float]
+
+    @property
+    def best(self) -> str:
+        """The place whose passes stand out most."""
+        return max(self.scores, key=self.scores.__getitem__)
+
+    @property
+    def chance(self) -> float:
+        """How often noise alone gives one of the places as high a score."""
+        least = min(self.chances.values())
+        return float(1.0 - (1.0 - least) ** len(self.chances))
+
+
+def evidence_of(measured: Sequence[EnvelopeOrders]) -> PassEvidence:
+    """Return the evidence of logs.
+
+    The score of a place is a Gamma variable under noise. A spall's line adds to it what its
+    amplitudes are worth; of unknown amplitude it is the likelihood at the best one, with half a
+    unit off for each line (as Akaike's).
+    """
+    from scipy.special import gammaincc
+
+    places = list(measured[0].power)
+    count = sum(item.count for item in measured)
+    scores = {place: sum(item.score(place) for item in measured) for place in places}
+    chances = {place: float(gammaincc(count, score)) for place, score in scores.items()}
+    gain = np.array([score - count * (1.0 + np.log(score / count)) for score in scores.values()])
+    gain = np.where(np.array(list(scores.values())) > count, gain - 1.0, -np.inf)
+    logs = np.concatenate(([np.log(1.0 - _PRIOR)], np.log(_PRIOR / len(places)) + gain))
+    shares = np.exp(logs - np.logaddexp.reduce(logs))
+    return PassEvidence(scores, chances, dict(zip(places, shares[1:].tolist(), strict=True)))
+
+
+def size_of(
+    measured: Sequence[EnvelopeOrders], simulated: Sequence[Sequence[EnvelopeOrders]], place: str
+) -> tuple[float, float, float]:
+    """Return 5 %, median and 95 % of a spall's length [m], flat before in its logarithm.
+
+    Parameters
+    ----------
+    measured : sequence of EnvelopeOrders
+        Logs.
+    simulated : sequence of sequence of EnvelopeOrders
+        The model's runs of each log's test, at `_SIZES`.
+    place : str
+        Where the spall is.
+    """
+    sizes = np.geomspace(_SIZES[0], _SIZES[-1], _GRID)
+    total = np.zeros(_GRID)
+    for log, runs in zip(measured, simulated, strict=True):
+        table = np.array([run.amplitudes(place) for run in runs])
+        model = np.array([np.interp(np.log(sizes), np.log(_SIZES), column) for column in table.T]).T
+        total += _likelihood(log.amplitudes(place), model, log.deviations())
+    weights = np.exp(total - total.max())
+    low, middle, high = _quantiles(sizes, weights)
+    return low, middle, high
+
+
+def _likelihood(measured: Floats, model: Floats, noise: Floats) -> Floats:
+    """Logarithm of the likelihood of amplitudes, shape (h,), under rows of a model's, (n, h).
+
+    Deviations: noise, the model's own, and a factor on all lines alike (Sherman and Morrison).
+    """
+    size = np.linalg.norm(model, axis=1)[:, None] / np.sqrt(model.shape[1])
+    deviation = np.hypot(noise, _MODEL * size)
+    off, along = (measured - model) / deviation, _MOUNT * model / deviation
+    stretch = 1.0 + np.sum(along**2, axis=1)
+    square = np.sum(off**2, axis=1) - np.sum(off * along, axis=1) ** 2 / stretch
+    return -0.5 * square - np.sum(np.log(deviation), axis=1) - 0.5 * np.log(stretch)
+
+
+def _quantiles(sizes: Floats, weights: Floats) -> list[float]:
+    share = np.cumsum(weights) / np.sum(weights)
+    return [float(np.interp(q, share, sizes)) for q in _INTERVAL]
+
+
+def diagnose_spall(
+    logs: Sequence[Log], actuator: Actuator, false_alarm: float, *, alone: bool
+) -> tuple[Diagnosis | None, tuple[str, ...]]:
+    """Return the answer of an accelerometer, or None where it hears nothing, and the findings.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Each with an accelerometer (`shows_passes`).
+    actuator : Actuator
+        The healthy unit.
+    false_alarm : float
+        Rate at which a healthy unit may be called spalled.
+    alone : bool
+        Whether nothing else looks at the logs: then healthy is an answer, too.
+
+    Raises
+    ------
+    ValueError
+        A log without two turns in one direction.
+    """
+    readings = [PassReading(log, actuator) for log in logs]
+    heard = [(reading, reading.measured()) for reading in readings]
+    measured = [orders for _, orders in heard]
+    evidence = evidence_of(measured)
+    if evidence.chance > false_alarm:
+        note = f"accelerometer: no spall (chance of noise alone {evidence.chance:.2g})"
+        return (_answer(heard, evidence, None, false_alarm, note) if alone else None), (note,)
+    place = evidence.best
+    simulated = [reading.simulated(place, _SIZES) for reading in readings]
+    low, size, high = size_of(measured, simulated, place)
+    cause = Cause(KIND, place, "m", evidence.probabilities[place], size, (low, high),
+                  _ambiguous(evidence, place))  # fmt: skip
+    return _answer(heard, evidence, cause, false_alarm, _current(readings, place)), ()
+
+
+def _ambiguous(evidence: PassEvidence, place: str) -> tuple[FaultPlace, ...]:
+    return tuple(
+        FaultPlace(KIND, other)
+        for other, share in evidence.probabilities.items()
+        if other != place and share > _NAMED
+    )
+
+
+def _answer(
+    heard: Sequence[tuple[PassReading, EnvelopeOrders]],
+    evidence: PassEvidence,
+    cause: Cause | None,
+    false_alarm: float,
+    note: str,
+) -> Diagnosis:
+    share = sum(evidence.probabilities.values())
+    named = () if cause is None else (
+        SuspectedFault(KIND, cause.place, cause.severity, "m", cause.interval),
+    )  # fmt: skip
+    p_best = 1.0 - share if cause is None else cause.probability
+    return Diagnosis(
+        logs=tuple(reading.log.name for reading, _ in heard),
+        status="healthy" if cause is None else "faulty",
+        p_fault=share,
+        false_alarm=false_alarm,
+        chance=evidence.chance,
+        faults=() if cause is None else (cause,),
+        best=() if cause is None else (f"{KIND}@{cause.place}",),
+        p_best=p_best,
+        unobservable=(),
+        detectable={},
+        features=_features(heard, "" if cause is None else cause.place),
+        findings=(note, _ONLY),
+        seconds=0.0,
+        hypotheses=(Explanation(named, p_best),),
+        severity_units={f"{KIND}@{place}": "m" for place in evidence.scores},
+    )
+
+
+_ONLY = (
+    "only the accelerometer was asked: for other faults diagnose the stand's slow logs, or give "
+    "baselines of this test"
+)
+
+
+def _features(heard: Sequence[tuple[PassReading, EnvelopeOrders]], named: str) -> tuple[Moved, ...]:
+    """The first line of each place, against noise."""
+    rows = []
+    for reading, orders in heard:
+        for place in orders.power:
+            value, spread = float(orders.amplitudes(place)[0]), float(orders.deviations()[0])
+            left = value if place == named else 0.0
+            name = f"envelope at the passes of {place}"
+            rows.append(Moved(reading.log.name, name, "m/s2", value, 0.0, spread, left))
+    return tuple(rows)
+
+
+def _current(readings: Sequence[PassReading], place: str) -> str:
+    shown = [orders for orders in (r.of_current() for r in readings) if orders is not None]
+    if not shown:
+        return "no torque current in the log"
+    chance = evidence_of(shown).chances[place]
+    verb = "shows" if chance < 0.01 else "does not show"
+    return f"the torque current {verb} the passes of {place} (chance of noise alone {chance:.2g})"
