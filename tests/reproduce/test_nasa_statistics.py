@@ -192,3 +192,14 @@ def test_the_gap_shows_in_the_trapezoid_under_load(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert all(abs(row["half_severity"]) < abs(row["effect_size"]) for row in rows)
     assert result.to_dict() == reproduce_separation(**arguments).to_dict()  # type: ignore[arg-type]
+
+
+def test_healthy_pairs_are_held_to_their_own_level_and_tables_to_the_familys():
+    """Of 200 comparisons a table, 5 % of tables: 0.025 % of pairs; ten times that is a fault."""
+    from elevon.reproduce.nasa.separation import null_checks
+
+    level = 1.0 - 0.05 / 200.0
+    assert all(check.passed for check in null_checks(2.5e-4, 0.05, level))
+    pairs, tables = null_checks(2.5e-3, 0.05, level)
+    assert (pairs.passed, tables.passed) == (False, True)
+    assert not null_checks(2.5e-4, 0.10, level)[1].passed

@@ -268,7 +268,7 @@ def _predicted(
 
 
 def _after_corners(time: Floats, command: Floats) -> npt.NDArray[np.bool_]:
-    """Tell which instants follow a corner: the slope changes its sign, and by more than a sine's."""
+    """Tell which instants follow a corner: the slope jumps by more than a sine's does."""
     slope = np.gradient(command, time)
     jump = np.abs(np.diff(slope, prepend=slope[0])) > 0.2 * float(np.abs(slope).max())
     corners = time[jump]
