@@ -152,7 +152,8 @@ def envelope_orders(
     levels, turns = [], []
     for part in parts:
         even, length = _over_angle(angle[part], level_of[part])
-        lines = {name: order * np.arange(1, harmonics + 1) for name, order in orders.items()}
+        count = np.arange(1.0, harmonics + 1.0)
+        lines = {name: np.asarray(order * count) for name, order in orders.items()}
         for name, at in lines.items():
             rows[name].append(_power(even, at))
         levels.append(_beside(even, length, list(orders.values())))
@@ -195,9 +196,9 @@ def _power(values: Floats, orders: Floats) -> Floats:
 def _beside(values: Floats, turns: float, orders: Sequence[float]) -> float:
     """Return the mean power beside the lines: from the median, which single lines do not move."""
     low, high = _ORDERS
-    grid = np.arange(low, high, 2.0 / turns)
+    grid: Floats = np.arange(low, high, 2.0 / turns)
     away = np.ones(len(grid), dtype=bool)
     for order in orders:
         away &= np.abs(grid / order - np.rint(grid / order)) * order > min(2.0 / turns, 0.3 * order)
-    chosen = grid[away] if away.sum() > 8 else grid
+    chosen: Floats = grid[away] if away.sum() > 8 else grid
     return float(np.median(_power(values, chosen)) / np.log(2.0))

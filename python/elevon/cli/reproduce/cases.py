@@ -214,6 +214,15 @@ CASES = (
         show=_show_current,
     ),
     PublishedCase(
+        "nasa-faults",
+        "Dynamic eccentricity and winding shorts as printed, and both ways to seed a short.",
+        "simulating 36 runs",
+        _R + "nasa.figures:reproduce_faults",
+        ("level", "resistance_ohm", "speed_rad_s", "turns_a", "resistor_a"),
+        "current that a winding short adds to the leg, by shorted turns and by a resistor",
+        page=_R + "nasa.page_figures:faults_report",
+    ),
+    PublishedCase(
         "nasa-thermal",
         "Heat the ballscrew actuator's motor for an hour, held to closed forms.",
         "simulating nine hours at low fidelity",
@@ -285,6 +294,15 @@ CASES = (
         "model less virtual rig; the thesis prints no error",
         page=_R + "pisa_validation_page:validation_page",
         options={"fidelity": (_FIDELITY, "high")},
+    ),
+    PublishedCase(
+        "pisa-commutation",
+        "Commutate and modulate as the thesis draws it, and short the motor in an extension.",
+        "simulating two strokes",
+        _R + "pisa_currents:reproduce_commutation",
+        ("begin_deg", "hall", "high", "low", "wrong_percent", "duty_percent", "on_percent"),
+        "sectors of one electrical turn, in retraction",
+        page=_R + "pisa_currents_page:commutation_report",
     ),
     PublishedCase(
         "pisa-failures",

@@ -112,7 +112,8 @@ def _likelihood(measured: Floats, model: Floats, noise: Floats) -> Floats:
     off, along = (measured - model) / deviation, _MOUNT * model / deviation
     stretch = 1.0 + np.sum(along**2, axis=1)
     square = np.sum(off**2, axis=1) - np.sum(off * along, axis=1) ** 2 / stretch
-    return -0.5 * square - np.sum(np.log(deviation), axis=1) - 0.5 * np.log(stretch)
+    volume = np.sum(np.log(deviation), axis=1) + 0.5 * np.log(stretch)
+    return np.asarray(-0.5 * square - volume)
 
 
 def _quantiles(sizes: Floats, weights: Floats) -> list[float]:
