@@ -156,7 +156,7 @@ def envelope_orders(
         lines = {name: np.asarray(order * count) for name, order in orders.items()}
         for name, at in lines.items():
             rows[name].append(_power(even, at))
-        levels.append(_beside(even, length, list(orders.values())))
+        levels.append(_level(even, length, list(orders.values())))
         turns.append(length)
     power = {name: np.array(items) for name, items in rows.items()}
     return EnvelopeOrders(tuple(turns), power, np.array(levels))
@@ -193,7 +193,7 @@ def _power(values: Floats, orders: Floats) -> Floats:
     return np.asarray(np.abs(2.0 * lines / np.sum(window)) ** 2)
 
 
-def _beside(values: Floats, turns: float, orders: Sequence[float]) -> float:
+def _level(values: Floats, turns: float, orders: Sequence[float]) -> float:
     """Return the mean power beside the lines: from the median, which single lines do not move."""
     low, high = _ORDERS
     grid: Floats = np.arange(low, high, 2.0 / turns)

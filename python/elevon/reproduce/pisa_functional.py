@@ -156,7 +156,7 @@ def _checks(row: FunctionalRow, cycle: float, points: Mapping[str, float]) -> li
     """The required cycle; the profile's times and the set points where they are to be held."""
     where = f"{row.condition.name} ({row.condition.load_factor:g} g, {row.condition.supply:g} V)"
     checks = [Check(f"cycle, {where}", row.cycle_s, cycle, "s")]
-    if not row.condition.held:
+    if not row.condition.constant_speed:
         return checks
     found = {
         f"{stroke} against its speed profile": took / row.profile_s[stroke]

@@ -47,7 +47,7 @@ class Condition:
     requirement: float | None
 
     @property
-    def held(self) -> bool:
+    def constant_speed(self) -> bool:
         """Whether the set points are to be held: where P doubles the cycle, it lets them go."""
         return self.requirement is not None and self.requirement < RELAXED
 

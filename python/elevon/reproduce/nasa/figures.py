@@ -37,7 +37,7 @@ RESISTANCES = (225.0, 150.0, 75.0, 50.0, 25.0)
 """ohm: 25, 50 and 150 ohm alone and in series."""
 SPEEDS = (10.0, 20.0, 40.0)
 """rad/s of the motor, at a voltage that stands still."""
-_STILL: dict[str, str | float] = {
+_FIXED_VOLTAGE: dict[str, str | float] = {
     "motor.inertia": 1e9, "control.current_limit": 1e4, "thermal.model": "off",
     "friction.static": 0.0, "friction.dynamic": 0.0, "friction.viscous": 0.0,
     "screw.preload": 0.0, "sensor.current.bandwidth": 0.0, "inverter.supply_voltage": 40.0,
@@ -214,7 +214,7 @@ def _seeding(actuator: Actuator, seed: int, progress: Progress | None) -> list[S
     """Run every level both ways at every speed; what each adds to the leg of phase 1."""
     from elevon.simulate import Run
 
-    unit = actuator.with_values(_STILL, request=False)
+    unit = actuator.with_values(_FIXED_VOLTAGE, request=False)
     faults = [""]
     faults += [f"{kind}@motor.phase_a={level!r}" for level in LEVELS
                for kind in ("short", "resistor_short")]  # fmt: skip
