@@ -43,7 +43,7 @@ COLD = 283.15
 
 
 @dataclass(frozen=True, slots=True)
-class ValidationRow(Plain):
+class StrokeSignalRow(Plain):
     """One signal of one stroke; percent of the measured RMS about its mean, and of its range.
 
     Attributes
@@ -94,7 +94,7 @@ class ValidationResult:
     parameter_hash: str
 
     @property
-    def rows(self) -> list[ValidationRow]:
+    def rows(self) -> list[StrokeSignalRow]:
         """One a stroke and compared signal."""
         errors = {(e.log, e.signal): e for e in self.validation.errors}
         sides = [_judged(side) for side in (self.validation, self.before, self.floor)]
@@ -104,7 +104,7 @@ class ValidationResult:
                 error, key = errors[stroke, signal], (stroke, signal)
                 now, before, floor = (side[key] for side in sides)
                 rows.append(
-                    ValidationRow(
+                    StrokeSignalRow(
                         stroke, signal, error.unit, held_out, error.rms, error.of_rms,
                         error.of_range, now, before, floor, _limit(signal, floor),
                     )

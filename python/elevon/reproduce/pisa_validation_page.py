@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.pisa_validation import DISPLAYED, MEAN, ValidationResult, ValidationRow
+from elevon.reproduce.pisa_validation import DISPLAYED, MEAN, ValidationResult, StrokeSignalRow
 from elevon.reproduce.provenance import provenance
 from elevon.units import display_unit, to_display
 
@@ -57,7 +57,7 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
     return report
 
 
-def _row(row: ValidationRow) -> list[object]:
+def _row(row: StrokeSignalRow) -> list[object]:
     unit = display_unit(row.unit)
     return [
         row.stroke,
