@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.pisa_validation import DISPLAYED, MEAN, ValidationResult, StrokeSignalRow
+from elevon.reproduce.pisa_validation import DISPLAYED, MEAN, StrokeSignalRow, ValidationResult
 from elevon.reproduce.provenance import provenance
 from elevon.units import display_unit, to_display
 
