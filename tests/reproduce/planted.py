@@ -12,6 +12,8 @@ import numpy as np
 
 from elevon.reproduce.nasa.baseline import baseline_matrix
 from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineRow
+from tests.reproduce import test_paper_figures as drawn
+from tests.reproduce import test_pisa_limits as gear
 from tests.reproduce.planting import given, patched, scaled, with_error
 
 # --- torino-backlash -----------------------------------------------------------------------------
@@ -83,13 +85,42 @@ def campaign(constant=1.4, **wrong):
 
 
 # --- nasa-current --------------------------------------------------------------------------------
-def current(count=32, nominal=7.0, jam=8.0):
-    """Return the checks of runs with these errors."""
+def current(count=32, nominal=7.0, jam=8.0, **largest):
+    """Return the checks of runs with these errors, and one with the largest."""
     from elevon.reproduce.nasa.current import CurrentResult
 
     rows = [SimpleNamespace(state="nominal", percent_rms=nominal)] * count
     rows += [SimpleNamespace(state="jam", percent_rms=jam)] * 10
+    for state, most in largest.items():
+        rows.append(SimpleNamespace(state=state.removesuffix("_most"), percent_rms=most))
     return CurrentResult(rows, [], 0, "").checks
+
+
+def drawn_figures(number=19, **changes):
+    """Return the checks of one of the two figures, but for what is wrong."""
+    from elevon.reproduce.nasa.figures import figure_checks
+
+    return figure_checks(
+        [item for k in (18, 19)
+         for item in drawn.figure(figure=k, **(changes if k == number else {}))]
+    )  # fmt: skip
+
+
+def seeding(change=lambda rows: rows, **wrong):
+    """Return the checks of both ways to seed a short."""
+    from elevon.reproduce.nasa.figures import seeding_checks
+
+    return seeding_checks(change(drawn.seeding(**wrong)))
+
+
+def figures_and_seeding():
+    """Return the checks of both parts."""
+    return [*drawn_figures(), *seeding()]
+
+
+def first_row(**changes):
+    """Return a change of the first row."""
+    return lambda rows: [replace(rows[0], **changes), *rows[1:]]
 
 
 # --- nasa-thermal --------------------------------------------------------------------------------
@@ -179,11 +210,11 @@ def refused():
 
 
 # --- nasa-separation -----------------------------------------------------------------------------
-def separation(rate=0.01, tables=0.02, half=(0.5,), impact=1.0):
+def separation(rate=1e-4, tables=0.02, half=(0.5,), impact=1.0):
     """Return the checks of a table with these shares, effects of half severity and impacts."""
     from elevon.reproduce.nasa.features import FEATURES
     from elevon.reproduce.nasa.impact import GAP, LOADED, UNLOADED, impact_checks
-    from elevon.reproduce.nasa.separation import _checks
+    from elevon.reproduce.nasa.separation import _checks, null_checks
 
     rows = [
         SimpleNamespace(effect=SimpleNamespace(size=1.0, significant=True),
@@ -198,13 +229,12 @@ def separation(rate=0.01, tables=0.02, half=(0.5,), impact=1.0):
     ):
         simulated[strong, load] = {"healthy": noise, GAP: noise + 2.0 * impact + 0.1 * noise}
         simulated[weak, load] = {"healthy": noise, GAP: noise + 1.0}
-    return [*_checks(rows, rate, tables), *impact_checks(simulated)]
+    level = 1.0 - 0.05 / 200.0
+    return [*null_checks(rate, tables, level), *_checks(rows), *impact_checks(simulated)]
 
 
 # --- pisa ----------------------------------------------------------------------------------------
-FUNCTIONAL = partial(with_error, "pisa-functional", fidelity="low")
 FRICTION = partial(with_error, "pisa-friction")
-VALIDATION = partial(with_error, "pisa-validation")
 
 
 def recovered(*kinds):
@@ -219,16 +249,24 @@ def recovered(*kinds):
     return ("pisa_friction:_checks", given(change))
 
 
-def hydraulic(electric=0.0, winding=0.0, oil=100.0):
-    """Return the checks of two temperatures between which the speeds differ by so many percent."""
-    from elevon.reproduce.hydraulic import HydraulicRow, _checks
+def commutation(row=None, pulses=None, **pulse):
+    """Return the checks of a sector and a shorted stretch, but for what is wrong."""
+    from elevon.reproduce.pisa_currents import SectorRow, ShortedPulse, checks_of
 
-    rows = [
-        HydraulicRow(20.0 + 50.0 * k, 1.0, "retraction", 40.0 + 0.4 * k * oil,
-                     40.0 + 0.4 * k * electric, 40.0 + 0.4 * k * winding, 1.0, 1.0)
-        for k in (0, 1)
-    ]  # fmt: skip
-    return _checks(rows)
+    sector = replace(SectorRow(30.0, "101", "a", "b", 0.0, 50.0, 50.5), **(row or {}))
+    short = replace(ShortedPulse(1.0, 1e-3, -1.0, 59.0), **pulse)
+    return checks_of([sector], [short] if pulses is None else pulses, 60.0)
+
+
+def functional(**changes):
+    """Return the checks of every condition, but for what is wrong in each."""
+    from elevon.reproduce.pisa_gear import CONDITIONS, FIGURES
+
+    return [
+        check
+        for condition in (*CONDITIONS[:-1], FIGURES)
+        for check in gear.functional_checks(condition, **changes)
+    ]
 
 
 def failures(safe=True, listed=False, missing=0):
@@ -252,8 +290,7 @@ def cranfield(alarms=2, **wrong):
 
 
 #: Cases whose checks need minutes or seconds of simulation.
-LONG = {"torino-backlash", "low-fidelity", "nasa-thermal", "pisa-functional", "pisa-friction",
-        "pisa-validation"}  # fmt: skip
+LONG = {"torino-backlash", "low-fidelity", "nasa-thermal", "pisa-friction"}  # fmt: skip
 
 GOOD = {
     "torino-backlash": partial(with_error, "torino-backlash"),
@@ -262,13 +299,15 @@ GOOD = {
     "torino-validation": bench_and_model,
     "torino-loaded": campaign,
     "nasa-current": current,
+    "nasa-faults": figures_and_seeding,
     "nasa-thermal": partial(with_error, "nasa-thermal"),
     "nasa-baseline": baseline,
     "nasa-separation": separation,
-    "pisa-functional": FUNCTIONAL,
+    "pisa-functional": functional,
     "pisa-friction": FRICTION,
-    "pisa-hydraulic": hydraulic,
-    "pisa-validation": VALIDATION,
+    "pisa-hydraulic": gear.hydraulic_checks,
+    "pisa-validation": gear.validation_checks,
+    "pisa-commutation": commutation,
     "pisa-failures": failures,
     "cranfield": cranfield,
 }
@@ -335,6 +374,26 @@ PLANTED = {
     ("nasa-current", "nominal runs"): partial(current, count=31),
     ("nasa-current", "nominal: average error of the current"): partial(current, nominal=10.1),
     ("nasa-current", "jam: average error of the current"): partial(current, jam=10.1),
+    ("nasa-current", "nominal: largest error of the current"): partial(current, nominal_most=10.0),
+    ("nasa-current", "jam: largest error of the current"): partial(current, jam_most=9.9),
+    ("nasa-faults", "Figure 18: change of the tracking error"):
+        partial(drawn_figures, 18, tracking_percent=0.06),
+    ("nasa-faults", "Figure 18: line of the fault over the healthy one"):
+        partial(drawn_figures, 18, line_a=0.009),
+    ("nasa-faults", "Figure 19: change of the tracking error"):
+        partial(drawn_figures, 19, tracking_percent=0.06),
+    ("nasa-faults", "Figure 19: line of the fault over the healthy one"):
+        partial(drawn_figures, 19, line_a=0.009),
+    ("nasa-faults", "Figure 19: rise of the current against the closed form"):
+        partial(drawn_figures, 19, torque_current_percent=7.6),
+    ("nasa-faults", "levels of the resistors against those printed"):
+        partial(seeding, first_row(resistance_ohm=200.0)),
+    ("nasa-faults", "resistor: spread of its current over speed"):
+        partial(seeding, resistor=lambda speed: 60.0 - speed),
+    ("nasa-faults", "shorted turns: spread of their current over speed"):
+        partial(seeding, turns=lambda _speed: 1.0),
+    ("nasa-faults", "least rise of the current from level to level"):
+        partial(seeding, first_row(resistor_a=0.2)),
     ("nasa-thermal", "steady state less the algebraic root"):
         _T((THERMAL + "steady_state", given(lambda actuator: actuator.with_values(
             {"thermal.convection": 1.1 * actuator.parameters.value("thermal.convection")})))),
@@ -350,6 +409,8 @@ PLANTED = {
         _T(dema(1, raised(0, 2.0, -5))),
     ("nasa-thermal", "fit of a hidden bench: rms error of the surface"):
         _T(dema(1, raised(0, 0.6))),
+    ("nasa-thermal", "fit of a hidden bench: the same with the air as it was at first"):
+        _T(("nasa.dema:_checks", given(lambda runs: (runs[0], runs[0]), 2))),
     ("nasa-thermal", "fit of a hidden bench: largest error of a recovered value"):
         _T(dema(0, one_wrong)),
     ("nasa-thermal", "fit of a hidden bench: winding, which is not measured"):
@@ -368,18 +429,22 @@ PLANTED = {
         lambda: baseline(coverage=(0.8, 0.1)),
     ("nasa-baseline", "known effects: mean error over its deviation"):
         lambda: baseline(coverage=(0.95, 0.4)),
-    ("nasa-separation", "healthy against healthy: *"): partial(separation, rate=0.1),
+    ("nasa-separation", "healthy against healthy: comparisons *"): partial(separation, rate=0.01),
+    ("nasa-separation", "healthy against healthy: tables *"): partial(separation, tables=0.1),
     ("nasa-separation", "faults of half severity that rank above the whole"):
         partial(separation, half=(0.5, 1.2)),
     ("nasa-separation", "rows in which half the severity was compared"):
         partial(separation, half=()),
     ("nasa-separation", "gap at * N: impact, *"): partial(separation, impact=0.4),
-    ("pisa-functional", "cycle, nominal (*"): error(
-        "pisa-functional", ("pisa_functional:stroke_time", scaled(1.6))),
-    ("pisa-functional", "cycle, normal (*"): error(
-        "pisa-functional", ("pisa_functional:stroke_time", scaled(1.6))),
-    ("pisa-functional", "cycle, critical (*"): error(
-        "pisa-functional", ("pisa_functional:stroke_time", scaled(3.0))),
+    ("pisa-functional", "cycle, nominal (*"): partial(functional, extension_s=14.0),
+    ("pisa-functional", "cycle, normal (*"): partial(functional, extension_s=14.0),
+    ("pisa-functional", "cycle, normal, as Figs. *"): partial(functional, retraction_s=14.0),
+    ("pisa-functional", "cycle, critical (*"): partial(functional, extension_s=34.0),
+    ("pisa-functional", "* against its speed profile, *"): partial(functional, extension_s=7.4),
+    ("pisa-functional", "*, high speed against its set point, *"):
+        partial(functional, speeds={"extension_high": 625.0}),
+    ("pisa-functional", "*, low speed against its set point, *"):
+        partial(functional, speeds={"retraction_low": 260.0}),
     ("pisa-friction", "mass: worst error over the largest"):
         error("pisa-friction", recovered("mass")),
     ("pisa-friction", "mean friction, FF*: worst error over the largest"):
@@ -391,13 +456,23 @@ PLANTED = {
     ("pisa-friction", "efficiency over load: worst error over the largest"):
         error("pisa-friction", recovered("efficiency")),
     ("pisa-hydraulic", "retraction, spread of the controlled speed"):
-        partial(hydraulic, electric=6.0),
-    ("pisa-hydraulic", "the same with the winding's temperature alone"):
-        partial(hydraulic, winding=6.0),
-    ("pisa-hydraulic", "retraction, spread of the hydraulic speed"):
-        partial(hydraulic, electric=4.0, oil=2.0),
-    ("pisa-validation", "*: position"): error(
-        "pisa-validation", ("elevon.calibrate.replay:as_recorded", scaled(1.1))),
+        partial(gear.hydraulic_checks, "retraction", electric=6.0),
+    ("pisa-hydraulic", "extension, spread of the controlled speed"):
+        partial(gear.hydraulic_checks, "extension", electric=6.0),
+    ("pisa-hydraulic", "*, the same with the winding's temperature alone"):
+        partial(gear.hydraulic_checks, winding=6.0),
+    ("pisa-hydraulic", "*, spread of the hydraulic speed"):
+        partial(gear.hydraulic_checks, electric=4.0, oil=2.0),
+    ("pisa-validation", "*: output position"): partial(gear.validation_checks, "output_position"),
+    ("pisa-validation", "*: motor speed"): partial(gear.validation_checks, "motor_speed"),
+    ("pisa-validation", "*: torque current"): partial(gear.validation_checks, "torque_current"),
+    ("pisa-commutation", "samples whose Hall code is not that of their sector"):
+        partial(commutation, {"wrong_percent": 0.2}),
+    ("pisa-commutation", "on-time of the pair less the demanded duty"):
+        partial(commutation, {"on_percent": 52.5}),
+    ("pisa-commutation", "weakest braking of a shorted stretch"): partial(commutation, torque=0.01),
+    ("pisa-commutation", "largest current of the shorted motor over the cut-off"):
+        partial(commutation, peak=62.0),
     ("pisa-failures", "unsafe rows outside the listed set"): partial(failures, safe=False),
     ("pisa-failures", "listed rows that are safe"): partial(failures, listed=True),
     ("pisa-failures", "rows, one a fault, place, severity and phase"): partial(failures, missing=1),

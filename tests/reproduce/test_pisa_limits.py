@@ -19,13 +19,19 @@ from elevon.reproduce.pisa_validation import DISPLAYED, ValidationResult
 UNITS = {"output_position": "m", "motor_speed": "rad/s", "torque_current": "A"}
 
 
-def functional(condition, **changes):
+def functional_checks(condition=CONDITIONS[0], **changes):
+    """Return the checks of a condition whose strokes are the profile's, but for changes."""
     points, profile = set_points(), profile_times()
     speeds = {f"{s}_{part}": v for s in ("extension", "retraction") for part, v in points.items()}
     row = FunctionalRow(condition, profile["extension"], profile["retraction"], 20.0, 600.0,
                         profile, speeds, None, None)  # fmt: skip
-    row = replace(row, **changes)
-    return [c for c in pisa_functional._checks(row, condition.requirement, points) if not c.passed]
+    speeds = speeds | changes.pop("speeds", {})
+    row = replace(row, speeds_rad_s=speeds, **changes)
+    return pisa_functional._checks(row, condition.requirement, points)
+
+
+def functional(condition, **changes):
+    return [check for check in functional_checks(condition, **changes) if not check.passed]
 
 
 def test_the_profile_is_that_of_the_thesis():
@@ -43,27 +49,31 @@ def test_functional_checks_fail_on_planted_errors():
     slow = profile_times()["extension"] * 1.06
     (found,) = functional(nominal, extension_s=slow)
     assert "extension against its speed profile" in found.name
-    speeds = {"extension_high": 590.596, "extension_low": 280.264, "retraction_high": 590.596,
-              "retraction_low": 280.264 * 1.06}  # fmt: skip
-    (found,) = functional(nominal, speeds_rad_s=speeds)
+    (found,) = functional(nominal, speeds={"retraction_low": 280.264 * 1.06})
     assert "retraction, low speed" in found.name
     # Where P doubles the cycle the set points may go, the cycle may not.
     critical = CONDITIONS[3]
-    assert functional(critical, speeds_rad_s=dict.fromkeys(speeds, 100.0)) == []
+    assert functional(critical, speeds={"extension_high": 100.0}) == []
     assert [c.limit for c in functional(critical, extension_s=40.0)] == [40.0]
 
 
-def test_the_hydraulic_comparison_judges_both_directions():
-    def rows(speed):
-        return [
-            HydraulicRow(20.0, nz, direction, 50.0 - 5.0 * nz, at, 50.0, 8.0, 8.0)
-            for direction in ("extension", "retraction")
-            for nz, at in ((0.0, 50.0), (1.0, speed if direction == "extension" else 50.0))
-        ]
+def hydraulic_checks(wrong="extension", electric=0.0, winding=0.0, oil=50.0):
+    """Return the checks of two loads between which one direction's speeds differ by percents."""
+    rows = [
+        HydraulicRow(20.0, nz, way, 40.0 + 0.4 * nz * (oil if way == wrong else 50.0),
+                     40.0 + 0.4 * nz * electric * (way == wrong),
+                     40.0 + 0.4 * nz * winding * (way == wrong), 8.0, 8.0)
+        for way in ("extension", "retraction")
+        for nz in (0.0, 1.0)
+    ]  # fmt: skip
+    return hydraulic._checks(rows)
 
-    assert all(check.passed for check in hydraulic._checks(rows(51.0)))
-    failed = [check.name for check in hydraulic._checks(rows(54.0)) if not check.passed]
-    assert failed == ["extension, spread of the controlled speed"]
+
+def test_the_hydraulic_comparison_judges_both_directions():
+    assert all(check.passed for check in hydraulic_checks(electric=4.0))
+    for way in ("extension", "retraction"):
+        failed = [c.name for c in hydraulic_checks(way, electric=6.0) if not c.passed]
+        assert failed == [f"{way}, spread of the controlled speed"]
 
 
 def validation(wrong):
@@ -72,6 +82,14 @@ def validation(wrong):
     simulated = {n: v * (1.3 if n == wrong else 1.0) for n, v in measured.items()}
     trace = ValidationTrace("extend", time, measured, simulated, np.ones(len(time), dtype=bool))
     return Validation("gear", "low", 0.0, tuple(trace.errors(UNITS)), {}, (trace,))
+
+
+def validation_checks(wrong=""):
+    """Return the checks of a held-out stroke of which one signal is a third too large."""
+    good = validation("")
+    return ValidationResult(
+        validation(wrong), good, good, {"extend": True}, {}, "low", 0, ""
+    ).checks
 
 
 @pytest.mark.parametrize("wrong", DISPLAYED)

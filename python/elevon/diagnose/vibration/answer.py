@@ -215,9 +215,9 @@ def _features(heard: Sequence[tuple[PassReading, EnvelopeOrders]], named: str) -
 
 
 def _current(readings: Sequence[PassReading], place: str) -> str:
-    found = [orders for orders in (r.of_current() for r in readings) if orders is not None]
-    if not found:
+    currents = [orders for orders in (r.of_current() for r in readings) if orders is not None]
+    if not currents:
         return "no torque current in the log"
-    chance = evidence_of(found).chances[place]
+    chance = evidence_of(currents).chances[place]
     verb = "shows" if chance < 0.01 else "does not show"
     return f"the torque current {verb} the passes of {place} (chance of noise alone {chance:.2g})"

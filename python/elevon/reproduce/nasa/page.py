@@ -63,7 +63,8 @@ def _thermal(result: ThermalResult, date: str | None) -> Report:
             "The paper fits its network to an hour on a smaller stand (surface within 0.84 K, "
             "0.42 K rms) and prints neither temperatures nor parameters. Here a bench with hidden "
             "values about the set nasa-dema is measured in the same way (surface and nut, averaged "
-            "over 1 s) and fitted; the load changes every quarter of an hour.",
+            "over 1 s) and fitted; the load changes every quarter of an hour, and the air warms by "
+            "some degrees: the model is given what the air's thermocouple says.",
         )
         section.figure(_fit_figure(result.fit), "Surface and nut as measured and as fitted.")
         section.table(
@@ -80,6 +81,9 @@ def _fit_figure(fit: DemaFit) -> Figure:
             fitted = fit.fitted[row] - 273.15
             axes.plot(minutes, fitted, color=COLOURS[colour], label=f"{name}, fitted")
         label = "winding, not measured"
+        axes.plot(
+            minutes, fit.air - 273.15, ".", ms=1, color=COLOURS["blue"], label="air, measured"
+        )
         axes.plot(minutes, fit.fitted[2] - 273.15, color=COLOURS["orange"], label=label, lw=0.8)
         axes.set(xlabel="Time [min]", ylabel="Temperature [degC]")
         axes.legend(loc="upper left")
