@@ -158,7 +158,7 @@ def _checks(row: FunctionalRow, cycle: float, points: Mapping[str, float]) -> li
     checks = [Check(f"cycle, {where}", row.cycle_s, cycle, "s")]
     if not row.condition.constant_speed:
         return checks
-    found = {
+    shares = {
         f"{stroke} against its speed profile": took / row.profile_s[stroke]
         for stroke, took in (("extension", row.extension_s), ("retraction", row.retraction_s))
     } | {
@@ -169,7 +169,7 @@ def _checks(row: FunctionalRow, cycle: float, points: Mapping[str, float]) -> li
     }
     return checks + [
         Check(f"{name}, {where}", 100.0 * abs(share - 1.0), DEPARTURE, "%")
-        for name, share in found.items()
+        for name, share in shares.items()
     ]
 
 

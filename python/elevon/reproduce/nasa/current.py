@@ -108,8 +108,11 @@ class CurrentResult:
         nominal = [row for row in self.rows if row.state == "nominal"]
         checks = [Check("nominal runs", float(len(nominal)), 32.0, "", at_least=True)]
         for state, (average, most, _) in PUBLISHED.items():
-            found = self.summary(state)
-            for name, value, limit in (("average", found[0], average), ("largest", found[1], most)):
+            average_and_most = self.summary(state)
+            for name, value, limit in (
+                ("average", average_and_most[0], average),
+                ("largest", average_and_most[1], most),
+            ):
                 checks.append(Check(f"{state}: {name} error of the current", value, limit, "%"))
         return checks
 

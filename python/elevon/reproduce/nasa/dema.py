@@ -146,8 +146,8 @@ def fit_dema(seed: int = 0, progress: Progress | None = None) -> DemaFit:
         FitRow(path, *(float(np.exp(x)) for x in (h, f, f - 1.96 * d, f + 1.96 * d)))
         for path, h, f, d in zip(FITTED, hidden, logarithms, deviation, strict=True)
     ]
-    still = (known[0][:1], known[1][:1])
-    steady = _hours(nominal, [logarithms], still, part(progress, 0.91, 1.0))[0]
+    constant = (known[0][:1], known[1][:1])
+    steady = _hours(nominal, [logarithms], constant, part(progress, 0.91, 1.0))[0]
     checks = _checks(rows, measured, (runs[0], steady), truth)
     return DemaFit(rows, seconds, measured, runs[0], felt, steady, checks, dema.parameters.hash)
 
