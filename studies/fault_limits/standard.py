@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.bench.procedure import Procedure, RigStep, TraceStep, load_procedure, procedure_names
 from elevon.bench.stand import stand_of
+from elevon.bench.standard import POSITION, StandardTest, standard_tests
 from elevon.errors import ElevonWarning
 from elevon.logs.log import Log
 from elevon.progress import part
-from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -26,25 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Day", "StandardTest", "day_logs", "diagnosed", "standard_tests"]
 
-_LONGEST = 60.0  # s: longer traces are of temperatures
 _BLOCK = 12  # logs held at the recorder's inner rate at once
-_POSITION = "rotary"  # equipment whose logs are read by the model of the rotary bench
-
-
-@dataclass(frozen=True)
-class StandardTest:
-    """One trace of a procedure, with the steps that set the bench for it.
-
-    Attributes
-    ----------
-    name : str
-        Of the trace.
-    procedure : Procedure
-        Its steps.
-    """
-
-    name: str
-    procedure: Procedure
 
 
 @dataclass(frozen=True)
@@ -63,45 +44,6 @@ class Day:
     seed: int
 
 
-def standard_tests(actuator: Actuator) -> tuple[StandardTest, ...]:
-    """Return the tests, in the order of the bench's list.
-
-    What commands nothing, or is there for temperatures or vibration (a rate of its own), is none.
-    """
-    stand = stand_of(actuator.wiring)
-    out = []
-    for name in procedure_names(stand.name):
-        procedure = load_procedure(name)
-        traces = [step for step in procedure.step if isinstance(step, TraceStep)]
-        moved = any(isinstance(step, RigStep) and step.terms for step in procedure.step)
-        if stand.equipment == _POSITION:
-            traces = traces[:1]
-        for trace in traces:
-            if not moved and _read(trace):
-                out.append(StandardTest(trace.name, _up_to(procedure, trace)))
-    return tuple(out)
-
-
-def _read(trace: TraceStep) -> bool:
-    command = trace.command
-    moving = any(term.kind != "constant" for term in command.terms) or command.steps
-    return (
-        bool(moving)
-        and command.mode in ("position", "gear")
-        and trace.rate is None
-        and parse_quantity(trace.duration, "s", "duration") <= _LONGEST
-    )
-
-
-def _up_to(procedure: Procedure, trace: TraceStep) -> Procedure:
-    """Return the procedure with this trace alone, and what was set before it."""
-    from elevon.bench.procedure import BacklashStep
-
-    at = next(k for k, step in enumerate(procedure.step) if step is trace)
-    before = [s for s in procedure.step[:at] if not isinstance(s, TraceStep | BacklashStep)]
-    return procedure.model_copy(update={"step": (*before, trace)})
-
-
 def day_logs(
     actuator: Actuator,
     test: StandardTest,
@@ -114,7 +56,7 @@ def day_logs(
     for first in range(0, len(days), _BLOCK):
         block = days[first : first + _BLOCK]
         share = part(progress, first / len(days), (first + len(block)) / len(days))
-        rotary = stand_of(actuator.wiring).equipment == _POSITION
+        rotary = stand_of(actuator.wiring).equipment == POSITION
         made = _rotary if rotary else _loaded
         with (
             warnings.catch_warnings()

@@ -15,9 +15,9 @@ from elevon.bench.rig import setups
 from elevon.bench.traces import recorded
 from elevon.bench.virtual import traced
 from elevon.diagnose.monitor import Monitor
+from elevon.diagnose.monitor.by_positions import ROLES
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
 from elevon.diagnose.monitor.threshold import simulated
-from elevon.diagnose.monitor.windows import ROLES
 from elevon.errors import FormatError, InputError
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
@@ -230,7 +230,7 @@ def test_samples_that_are_none_are_refused(monitor, streams):
 def test_what_cannot_be_watched_is_refused(unit, monitor, streams):
     with pytest.raises(InputError, match="needs a baseline"):
         Monitor(unit, [])
-    with pytest.raises(InputError, match="rotary"):
+    with pytest.raises(InputError, match="the role 'command'"):
         Monitor(Actuator.load("nasa-ballscrew"), [streams["base"]])
     with pytest.raises(InputError, match="above zero"):
         Monitor(unit, [streams["base"]], false_alarm_time=0.0)

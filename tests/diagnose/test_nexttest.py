@@ -7,10 +7,10 @@ import pytest
 
 import elevon
 from elevon import Actuator
-from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.diagnose.engine.candidates import CANDIDATES, candidates_of
 from elevon.diagnose.surrogate.population import FAULTS
-from elevon.errors import FormatError, InputError
-from elevon.nexttest import Belief, Possible, next_test, profiles
+from elevon.errors import FormatError
+from elevon.nexttest import Belief, Possible, profiles
 from elevon.nexttest.belief import read_result
 from elevon.nexttest.information import expected_information, planned, updated
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
@@ -143,8 +143,59 @@ def test_a_file_that_is_no_result(tmp_path):
         (tmp_path / "r.json").write_text(text)
         with pytest.raises(FormatError, match=why):
             read_result(tmp_path / "r.json")
-    with pytest.raises(InputError, match="rotary"):
-        next_test(Actuator.load("nasa-ballscrew"))
+
+
+def _linear_result():
+    """What a diagnosis of a screw leaves open."""
+    screw = candidates_of(Actuator.load("nasa-ballscrew"))
+    backlash = (BACKLASH, 3e-5, [1e-5, 5e-5])
+    return {
+        "status": "faulty",
+        "detectable": {c.key: 0.1 for c in screw},
+        "hypotheses": [_set(0.5, backlash), _set(0.4, (FRICTION, 0.5, [0.4, 0.6])), _set(0.09)],
+    }
+
+
+def test_a_screws_and_a_gears_tests_are_their_stands():
+    screw, gear = Actuator.load("nasa-ballscrew"), Actuator.load("pisa-landing-gear")
+    names = {name: [p.name for p in profiles(unit)] for name, unit in (("s", screw), ("g", gear))}
+    assert "sine-opposing" in names["s"]
+    assert "retraction-normal" in names["g"]
+    nominal = next(p for p in profiles(gear) if p.name == "retraction-nominal")
+    assert nominal.duration == 12.0
+    assert nominal.parameters["action at 0.1 s"] == "retract"
+    assert nominal.parameters["force.over the stroke"] == "-1994.2 to -756.7 N"
+    with pytest.raises(FormatError, match="of this actuator: short"):
+        elevon.next_test(gear, [{**RESULT, "hypotheses": [_set(1.0, (SHORT + "x", 1, [0, 1]))]}])
+
+
+def test_what_is_counted_is_drawn_as_a_count():
+    gear = candidates_of(Actuator.load("pisa-landing-gear"))
+    switch = next(c for c in gear if c.switched)
+    rng = np.random.default_rng(1)
+    drawn = Possible((switch.key,), 1.0, (0.0,), (np.inf,)).severities(9, rng, {switch.key: switch})
+    assert (drawn == 1.0).all()
+
+
+def test_a_test_of_a_screw_tells_backlash_from_friction(monkeypatch):
+    from elevon.nexttest import choose
+
+    unit = Actuator.load("nasa-ballscrew")
+    monkeypatch.setattr(choose, "profiles", lambda a: profiles(a)[:1])  # a second each
+    answer = elevon.next_test(unit, [_linear_result()])
+    assert answer.next.name == "sine-free"
+    assert 0.3 * answer.unknown < answer.next.information < answer.unknown + 0.1
+    assert answer.next.rate == pytest.approx(5.0 * answer.next.information)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["nasa-ballscrew", "pisa-landing-gear"])
+def test_every_test_of_a_stand_is_ranked(name):
+    """Information lies between none and all, and what is not known before any test is the prior."""
+    answer = elevon.next_test(name)
+    assert len(answer.tests) == len(profiles(Actuator.load(name)))
+    assert all(-0.1 < t.information < answer.unknown for t in answer.tests)
+    assert answer.findings == ()
 
 
 def test_a_diagnosis_without_hypotheses_is_no_result():
@@ -155,7 +206,7 @@ def test_a_diagnosis_without_hypotheses_is_no_result():
 def test_the_command_line(elevon_cli, monkeypatch, tmp_path):  # noqa: F811
     from elevon.nexttest import choose
 
-    monkeypatch.setattr(choose, "profiles", lambda: profiles()[::2][:2])  # fewer: seconds each
+    monkeypatch.setattr(choose, "profiles", lambda a: profiles(a)[::2][:2])  # fewer: seconds each
     path = tmp_path / "r.json"
     path.write_text(json.dumps(RESULT))
     result = elevon_cli("next-test", "--actuator", "torino-rotary", "--so-far", path, "--json")

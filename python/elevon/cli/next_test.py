@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elevon.cli import common
-from elevon.cli.output import answer, print_table, progress_bar
+from elevon.cli.output import answer, listed, print_table, progress_bar
 from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
@@ -39,8 +39,17 @@ def next_test(
 def _print(result: NextTest) -> None:
     answer(result.headline)
     print_table(
-        ("test", "expected [bit]", "healthy log at hand"),
-        [(t.name, f"{t.information:.3f}", "yes" if t.standard else "no") for t in result.tests],
+        ("test", "expected [bit]", "takes [s]", "[bit/min]", "healthy log at hand"),
+        [
+            (
+                t.name,
+                f"{t.information:.3f}",
+                f"{t.duration:g}",
+                f"{t.rate:.2g}",
+                "yes" if t.standard else "no",
+            )
+            for t in result.tests
+        ],
     )
     print_table(
         ("still possible", "probability"),
@@ -49,3 +58,4 @@ def _print(result: NextTest) -> None:
             for p in result.possible[:10]
         ],
     )
+    listed(result.findings)

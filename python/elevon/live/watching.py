@@ -118,7 +118,7 @@ class StreamWatch:
             return
         try:
             self._monitor = Monitor(self._actuator, [log], window=motion.window, longest=_STREAM)
-        except ElevonError:  # another wiring, too few windows: the diagnosis is alone
+        except ElevonError:  # too few windows, or no command: the diagnosis is alone
             self._refused = True
         self._fed = motion.begin + float(log.time[-1])
 
@@ -134,14 +134,12 @@ class StreamWatch:
         return 0.0 if origin is None else origin
 
     def _feed(self, log: Log, begin: float) -> None:
-        from elevon.diagnose.monitor.windows import ROLES
-
         assert self._monitor is not None
         time = log.time + begin
         new = time > self._fed
         if not new.any():
             return
-        channels = {role: log[role][new] for role in ROLES if log.has(role)}
+        channels = {role: log[role][new] for role in self._monitor.roles if log.has(role)}
         for step in self._monitor.feed({"time": time[new], **channels}):
             if not step.skipped:
                 self._statistic = step.statistic

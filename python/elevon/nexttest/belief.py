@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain, combinations
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,6 @@ _LONGEST = 2**24  # bytes of a result; it has some ten thousand
 _LEAST = 1e-4  # weight that all sets have together that a result does not list
 _SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it
 _NINETY = 3.29  # deviations in a Gaussian's interval of 90 %
-_KNOWN = {c.key: c for c in CANDIDATES}
 
 
 @dataclass(frozen=True)
@@ -45,33 +45,46 @@ class Possible:
     centre: tuple[float, ...] = ()
     deviation: tuple[float, ...] = ()
 
-    def severities(self, count: int, rng: np.random.Generator) -> Floats:
-        """Draw severities, shape (count, faults), within the candidates' ranges."""
+    def severities(
+        self, count: int, rng: np.random.Generator, known: Mapping[str, CandidateFault]
+    ) -> Floats:
+        """Draw severities, shape (count, faults), within the ranges of candidates, by key."""
         columns = []
         for key, centre, deviation in zip(self.keys, self.centre, self.deviation, strict=True):
-            c = _KNOWN[key]
+            c = known[key]
+            if c.whole:
+                deviation = min(deviation, c.high)  # noqa: PLW2901 - any count is as likely
             if math.isfinite(deviation):
                 drawn = centre + deviation * rng.standard_normal(count)
             else:
                 end = np.where(rng.random(count) * (c.high - c.low) < -c.low, c.low, c.high)
                 drawn = end * rng.uniform(_SMALL, 1.0, count) ** 2
-            columns.append(np.clip(drawn, c.low, c.high))
+            drawn = np.clip(drawn, c.low, c.high)
+            columns.append(np.maximum(np.rint(drawn), 1.0) if c.whole else drawn)
         return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
 
 @dataclass(frozen=True)
 class Belief:
-    """Sets of faults whose weights sum to one."""
+    """Sets of faults whose weights sum to one, and the candidates that they are of."""
 
     possible: tuple[Possible, ...]
+    candidates: tuple[CandidateFault, ...] = CANDIDATES
+
+    @cached_property
+    def known(self) -> dict[str, CandidateFault]:
+        """The candidates by their keys."""
+        return {c.key: c for c in self.candidates}
 
     @classmethod
-    def of(cls, possible: Sequence[Possible]) -> Belief:
+    def of(
+        cls, possible: Sequence[Possible], candidates: Sequence[CandidateFault] = CANDIDATES
+    ) -> Belief:
         """Return the sets with their weights made to sum to one."""
         total = sum(p.weight for p in possible)
         if not total > 0.0:
             raise InputError("next-test: nothing is possible; the results contradict each other")
-        return cls(tuple(replace(p, weight=p.weight / total) for p in possible))
+        return cls(tuple(replace(p, weight=p.weight / total) for p in possible), tuple(candidates))
 
     @classmethod
     def prior(cls, candidates: Sequence[CandidateFault] = CANDIDATES) -> Belief:
@@ -86,23 +99,27 @@ class Belief:
         for a, b in pairs:
             share = PRIOR_FAULTY * SECOND * a.rate * b.rate / norm
             out.append(Possible((a.key, b.key), share, (0.0, 0.0), (math.inf, math.inf)))
-        return cls.of(out)
+        return cls.of(out, candidates)
 
     @classmethod
-    def after(cls, results: Sequence[Mapping[str, Any]]) -> Belief:
+    def after(
+        cls,
+        results: Sequence[Mapping[str, Any]],
+        candidates: Sequence[CandidateFault] = CANDIDATES,
+    ) -> Belief:
         """Return what is believed after diagnoses (`elevon diagnose --json`) of different logs.
 
         Each result counts by how far it moved the weights from its own prior; a fault that it did
         not score counts as absent, as it would on a log that cannot show it.
         """
-        prior = cls.prior().possible
-        answered = [Answered.of(result) for result in results]
+        prior = cls.prior(candidates).possible
+        answered = [Answered.of(result, candidates) for result in results]
         out = []
         for before in prior:
             weight = before.weight * math.prod(t.ratio(before) for t in answered)
             known = [t.possible[before.keys] for t in answered if before.keys in t.possible]
             out.append(_merged(replace(before, weight=weight), known))
-        return cls.of([p for p in out if p.weight > 0.0])
+        return cls.of([p for p in out if p.weight > 0.0], candidates)
 
     @property
     def entropy(self) -> float:
@@ -113,7 +130,7 @@ class Belief:
 
     def leading(self, least: float = 0.003) -> Belief:
         """Return the sets that are worth telling apart."""
-        return Belief.of([p for p in self.possible if p.weight >= least])
+        return Belief.of([p for p in self.possible if p.weight >= least], self.candidates)
 
 
 def _merged(possible: Possible, results: Sequence[Possible]) -> Possible:
@@ -128,23 +145,33 @@ def _merged(possible: Possible, results: Sequence[Possible]) -> Possible:
     return replace(possible, centre=tuple(centre.tolist()), deviation=tuple(deviation.tolist()))
 
 
-def read_result(result: Mapping[str, object] | str | Path) -> dict[str, object]:
+def read_result(
+    result: Mapping[str, object] | str | Path,
+    candidates: Sequence[CandidateFault] = CANDIDATES,
+) -> dict[str, object]:
     """Take what `elevon diagnose --json` printed, from a file or as a mapping, and check it.
+
+    Parameters
+    ----------
+    result : mapping or path
+        What was printed.
+    candidates : sequence of CandidateFault
+        Of the actuator; default: a turning servo's.
 
     Raises
     ------
     FormatError
-        No such file, no JSON, or no diagnosis of a rotary actuator.
+        No such file, no JSON, or no diagnosis of such an actuator.
     """
     given = isinstance(result, Mapping)
     try:
         data = result if isinstance(result, Mapping) else json.loads(read_regular(result, _LONGEST))
-        Answered.of(data)
+        Answered.of(data, candidates)
     except (OSError, ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
         why = f"no {error}" if isinstance(error, KeyError) else str(error)
         place = "the diagnosis" if given else f"{result}"
         raise FormatError(
-            f"{place}: not a result of elevon diagnose --json of a rotary actuator: {why}"
+            f"{place}: not a result of elevon diagnose --json of this actuator: {why}"
         ) from error
     return dict(data)
 
@@ -171,11 +198,14 @@ class Answered:
     prior: dict[tuple[str, ...], float]
 
     @classmethod
-    def of(cls, result: Mapping[str, Any]) -> Answered:
+    def of(
+        cls, result: Mapping[str, Any], candidates: Sequence[CandidateFault] = CANDIDATES
+    ) -> Answered:
         """Read a result."""
-        possible = {one.keys: one for one in map(_possible, result["hypotheses"])}
+        keys = [c.key for c in candidates]
+        possible = {one.keys: one for one in (_possible(h, keys) for h in result["hypotheses"])}
         seen = {*result["detectable"], *chain.from_iterable(possible)}
-        candidates = [c for c in CANDIDATES if c.key in seen]
+        candidates = [c for c in candidates if c.key in seen]
         prior = {p.keys: p.weight for p in Belief.prior(candidates).possible}
         if result.get("method") == "surrogate":
             prior = {keys: _trained(len(keys)) for keys in prior}
@@ -200,12 +230,12 @@ def _trained(count: int) -> float:
     return faulty * share + (0.0 if count else 1.0 - faulty)
 
 
-def _possible(item: Mapping[str, Any]) -> Possible:
+def _possible(item: Mapping[str, Any], known: Sequence[str]) -> Possible:
     """Return one listed set; its keys in the order of the candidates."""
     rows = {f"{f['kind']}@{f['place']}": f for f in item["faults"]}
-    if not rows.keys() <= _KNOWN.keys():
-        raise ValueError(f"{', '.join(sorted(rows.keys() - _KNOWN.keys()))} is no candidate")
-    keys = tuple(sorted(rows, key=list(_KNOWN).index))
+    if not rows.keys() <= set(known):
+        raise ValueError(f"{', '.join(sorted(rows.keys() - set(known)))} is no candidate")
+    keys = tuple(sorted(rows, key=known.index))
     centre = tuple(float(rows[k]["severity"]) for k in keys)
     deviation = tuple(_deviation(rows[k]) for k in keys)
     return Possible(keys, float(item["probability"]), centre, deviation)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from elevon.diagnose.engine.candidates import CANDIDATES
-from elevon.errors import InputError, Interrupted
+from elevon.diagnose.engine.candidates import candidates_of
+from elevon.errors import DivergedError, InputError, Interrupted
 from elevon.nexttest.belief import Belief
 from elevon.nexttest.information import expected_information, planned
 from elevon.nexttest.profiles import profiles
@@ -34,6 +34,8 @@ class RankedTest(Plain):
         Whether a healthy unit's log of it is at hand as a rule.
     information : float
         Expected [bit].
+    duration : float
+        Of its log [s]: what it costs.
     """
 
     name: str
@@ -41,6 +43,12 @@ class RankedTest(Plain):
     parameters: Mapping[str, str]
     standard: bool
     information: Annotated[float, key("expected_information_bit"), in_unit("bit")]
+    duration: Annotated[float, in_unit("s")] = 0.0
+
+    @property
+    def rate(self) -> float:
+        """Expected information over its time [bit/min]."""
+        return 60.0 * self.information / self.duration if self.duration else 0.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,8 @@ class NextTest(Result):
         What is not known now [bit].
     possible : tuple of PossibleSet
         Sets of faults that may be there, most probable first.
+    findings : tuple of str
+        Tests that this actuator cannot run.
     seconds : float
         Time it took.
     """
@@ -70,6 +80,7 @@ class NextTest(Result):
     tests: tuple[RankedTest, ...]
     unknown: Annotated[float, key("unknown_bit"), in_unit("bit")]
     possible: tuple[PossibleSet, ...]
+    findings: tuple[str, ...] = ()
     seconds: Annotated[float, in_unit("s")] = field(default=0.0, compare=False)
 
     KIND: ClassVar = "next-test"
@@ -103,7 +114,7 @@ def next_test(
     Parameters
     ----------
     actuator : Actuator
-        The healthy unit, calibrated; rotary.
+        The healthy unit, calibrated.
     results : sequence of mapping
         Diagnoses so far, as `elevon diagnose --json` prints them, of different logs.
     progress : callable, optional
@@ -112,26 +123,32 @@ def next_test(
     Raises
     ------
     InputError
-        Another wiring; results that contradict each other.
+        Results that contradict each other; no test that the actuator can run.
     """
     begin = clock.perf_counter()
-    if actuator.wiring != "rotary":
-        raise InputError(
-            f"{actuator.name}: next-test serves the wiring 'rotary' so far, not {actuator.wiring!r}"
-        )
-    belief = Belief.after(results).leading()
+    belief = Belief.after(results, candidates_of(actuator)).leading()
     keys = {key for p in belief.possible for key in p.keys}
-    candidates = [c for c in CANDIDATES if c.key in keys] or list(CANDIDATES)
-    every = profiles()
-    out = []
+    candidates = [c for c in belief.candidates if c.key in keys] or list(belief.candidates)
+    every = profiles(actuator)
+    out, findings = [], []
     for number, profile in enumerate(every):
         if progress is not None and progress(number / len(every)) is False:
             raise Interrupted("interrupted between two tests")
-        case = planned(profile, actuator, candidates)
+        try:
+            case = planned(profile, actuator, candidates)
+        except (InputError, DivergedError) as error:
+            findings.append(f"{profile.name} is left out: {error}")
+            continue
         bits = expected_information(case, belief)
         name, parameters = profile.procedure.name, dict(profile.parameters)
-        out.append(RankedTest(profile.name, name, parameters, profile.standard, bits))
+        out.append(
+            RankedTest(profile.name, name, parameters, profile.standard, bits, profile.duration)
+        )
+    if not out:
+        raise InputError("; ".join(findings) or f"{actuator.name}: its stand has no test")
     out.sort(key=lambda item: -item.information)
     ranked = sorted(belief.possible, key=lambda p: -p.weight)
     possible = tuple(PossibleSet(p.keys, p.weight) for p in ranked)
-    return NextTest(tuple(out), belief.entropy, possible, clock.perf_counter() - begin)
+    return NextTest(
+        tuple(out), belief.entropy, possible, tuple(findings), clock.perf_counter() - begin
+    )

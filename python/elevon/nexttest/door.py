@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.engine.answer import Diagnosis
+from elevon.diagnose.engine.candidates import candidates_of
 from elevon.nexttest.belief import read_result
 from elevon.nexttest.choose import next_test as choose
 from elevon.simulate.arguments import as_actuator
@@ -40,16 +41,19 @@ def next_test(
     FormatError
         A result that is none, or that lists no hypotheses.
     InputError
-        An actuator that it does not serve; results that contradict each other.
+        No test that the actuator can run; results that contradict each other.
     """
+    model = as_actuator(actuator)
+    candidates = candidates_of(model)
     data = [
         read_result(
             item.to_dict()
             if isinstance(item, Diagnosis)
             else item
             if isinstance(item, Mapping)
-            else Path(item)
+            else Path(item),
+            candidates,
         )
         for item in results
     ]
-    return choose(as_actuator(actuator), data, progress=progress)
+    return choose(model, data, progress=progress)

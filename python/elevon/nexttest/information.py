@@ -8,24 +8,31 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.bench.loaded import loaded_setups, run_loaded
+from elevon.bench.rig import setups
+from elevon.bench.stand import stand_of
+from elevon.bench.standard import POSITION
+from elevon.bench.traces import recorded
 from elevon.bench.virtual import traced
-from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
+from elevon.diagnose.by_model import reading_of
+from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.healthy import healthy
 from elevon.diagnose.engine.likelihood import Frame
 from elevon.diagnose.engine.replay import replay
-from elevon.diagnose.positions.reading import PositionReading
+from elevon.logs.log import Log
 from elevon.nexttest.belief import Belief, Possible
+from elevon.scenario.compile import signal_records
+from elevon.simulate import Run, simulate_batch
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from elevon.actuator import Actuator
     from elevon.nexttest.profiles import BenchProfile
 
 _DRAWS = 200  # outcomes of a test
 _SAMPLES = 64  # severities of a set of faults
-_KNOWN = {c.key: c for c in CANDIDATES}
 
 
 def planned(
@@ -36,16 +43,7 @@ def planned(
     A healthy log of a standard test is taken to be at hand; a variant's stands against the
     model alone.
     """
-    from elevon.bench.rig import setups
-    from elevon.bench.traces import recorded
-    from elevon.scenario.compile import signal_records
-    from elevon.simulate import Run, simulate_batch
-
-    setup = setups(profile.procedure, actuator, seed=0)[0]
-    record = recorded(list(signal_records(actuator.wiring, "low")))
-    run = Run(setup.actuator, setup.scenario)
-    recording = simulate_batch([run], fidelity="low", record=record)[0]
-    item = PositionReading(traced(setup, recording), actuator)
+    item = reading_of(_healthy_log(profile, actuator), actuator)
     model = replay(item, candidates)
     names = [n for n in item.features.names if n in model.healthy.names]
     logged = item.features.only(names)
@@ -53,14 +51,28 @@ def planned(
     return LogCase(profile.name, replace(logged, values=unit.mean), unit, model)
 
 
-def _frame(case: LogCase, possible: Possible, severity: Floats) -> Frame:
+def _healthy_log(profile: BenchProfile, actuator: Actuator) -> Log:
+    """Return what the healthy model's log of a test would be."""
+    stand = stand_of(actuator.wiring)
+    if stand.equipment != POSITION:
+        loaded = loaded_setups(profile.procedure, actuator, stand, seed=0)[-1]
+        return Log.of(run_loaded(loaded, "low")[0], profile.name)
+    setup = setups(profile.procedure, actuator, seed=0)[0]
+    record = recorded(list(signal_records(actuator.wiring, "low")))
+    run = Run(setup.actuator, setup.scenario)
+    return traced(setup, simulate_batch([run], fidelity="low", record=record)[0])
+
+
+def _frame(
+    case: LogCase, known: Mapping[str, CandidateFault], possible: Possible, severity: Floats
+) -> Frame:
     """Return what whitens the features under a set of faults: the model's own errors with it."""
     plain = Frame(
         np.zeros(len(case.unit.names)), case.covariance, case.unit.degrees, case.shift,
         case.errors, case.uncertainty,
     )  # fmt: skip
     typical = [
-        (_KNOWN[key], centre if np.isfinite(deviation) else float(np.mean(severity[:, k])))
+        (known[key], centre if np.isfinite(deviation) else float(np.mean(severity[:, k])))
         for k, (key, centre, deviation) in enumerate(
             zip(possible.keys, possible.centre, possible.deviation, strict=True)
         )
@@ -69,16 +81,21 @@ def _frame(case: LogCase, possible: Possible, severity: Floats) -> Frame:
 
 
 def _seen(
-    case: LogCase, possible: Possible, count: int, seed: int
+    case: LogCase, belief: Belief, number: int, count: int, seed: int
 ) -> tuple[Frame, Floats, list[Floats]]:
-    """Frame, whitened shift of drawn severities, shape (count, k), and each fault's model error."""
-    severity = possible.severities(count, np.random.default_rng([seed, len(possible.keys)]))
-    frame = _frame(case, possible, severity)
+    """Frame, whitened shift of drawn severities, shape (count, k), and each fault's model error.
+
+    `number` is that of the set of faults.
+    """
+    possible = belief.possible[number]
+    rng = np.random.default_rng([seed, len(possible.keys)])
+    severity = possible.severities(count, rng, belief.known)
+    frame = _frame(case, belief.known, possible, severity)
     total, errors = np.zeros((count, len(case.unit.names))), []
     for k, key in enumerate(possible.keys):
         moved = frame.shift(key, severity[:, k])
         total += moved
-        errors.append(_KNOWN[key].error * moved)
+        errors.append(belief.known[key].error * moved)
     return frame, total, errors
 
 
@@ -87,7 +104,7 @@ def _likelihoods(case: LogCase, belief: Belief, outcomes: Floats) -> Floats:
     columns = []
     for number, possible in enumerate(belief.possible):
         count = _SAMPLES if possible.keys else 1
-        frame, shift, errors = _seen(case, possible, count, number)
+        frame, shift, errors = _seen(case, belief, number, count, number)
         rows = [frame.log((frame.root @ y)[None, :] - shift, *errors) for y in outcomes]
         columns.append(np.logaddexp.reduce(np.array(rows), axis=1) - np.log(count))
     return np.stack(columns, axis=1)
@@ -102,20 +119,23 @@ def expected_information(case: LogCase, belief: Belief, seed: int = 0) -> float:
     rng = np.random.default_rng([seed, 15])
     weights = np.array([p.weight for p in belief.possible])
     drawn = rng.choice(len(weights), _DRAWS, p=weights)
-    outcomes, sets = [], []
+    outcomes, sets, exact = [], [], []
     for number in np.unique(drawn):
         count = int((drawn == number).sum())
         draw_seed = int(rng.integers(2**31))
-        frame, shift, errors = _seen(case, belief.possible[number], count, draw_seed)
+        frame, shift, errors = _seen(case, belief, int(number), count, draw_seed)
         chi = np.sqrt(rng.chisquare(case.unit.degrees, count) / case.unit.degrees)
         noise = rng.standard_normal(shift.shape) / chi[:, None]
         outcome = shift + noise + sum(e * rng.standard_normal((count, 1)) for e in errors)
         outcomes.append(np.linalg.solve(frame.root, outcome.T).T)
+        exact.append(frame.log(outcome - shift, *errors))
         sets += [number] * count
     log = _likelihoods(case, belief, np.vstack(outcomes))
+    # Severities drawn anew may all miss the one of an outcome whose numbers leap with it.
+    at = np.arange(len(sets)), np.array(sets)
+    log[at] = np.logaddexp(log[at] + np.log(_SAMPLES), np.concatenate(exact)) - np.log(_SAMPLES + 1)
     mixed = np.logaddexp.reduce(log + np.log(weights), axis=1)
-    own_log = log[np.arange(len(sets)), sets]
-    return float(np.mean(own_log - mixed) / np.log(2.0))
+    return float(np.mean(log[at] - mixed) / np.log(2.0))
 
 
 def likelihoods(case: LogCase, belief: Belief, values: Floats) -> Floats:
@@ -128,5 +148,6 @@ def updated(case: LogCase, belief: Belief, values: Floats) -> Belief:
     log = likelihoods(case, belief, values)
     weights = np.array([p.weight for p in belief.possible]) * np.exp(log - log.max())
     return Belief.of(
-        [replace(p, weight=float(w)) for p, w in zip(belief.possible, weights, strict=True)]
+        [replace(p, weight=float(w)) for p, w in zip(belief.possible, weights, strict=True)],
+        belief.candidates,
     )

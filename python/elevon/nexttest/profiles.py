@@ -4,9 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from elevon.bench.procedure import BrakeStep, Procedure, TraceStep, load_procedure
+from elevon.bench.procedure import (
+    BrakeStep,
+    ForceStep,
+    Procedure,
+    SettingsStep,
+    TraceStep,
+    load_procedure,
+)
+from elevon.bench.standard import standard_tests
 from elevon.bench.virtual import first_trace
+from elevon.calibrate.ways import turns
+from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
 
 
 @dataclass(frozen=True)
@@ -30,6 +44,11 @@ class BenchProfile:
     parameters: Mapping[str, str] = field(default_factory=dict)
     standard: bool = True
 
+    @property
+    def duration(self) -> float:
+        """Length of its log [s]."""
+        return parse_quantity(self.procedure.traces[-1].duration, "s", "duration")
+
 
 #: Variant to procedure, and values of its command and of its brake that differ. ASSUMED: within
 #: the motor's 500 rpm, the stops and the brake's 5.5 N m.
@@ -42,12 +61,22 @@ _VARIANTS: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, str]]] = {
 _STANDARD = ("backlash", "chirp", "loaded")
 
 
-def profiles() -> tuple[BenchProfile, ...]:
+def profiles(actuator: Actuator | None = None) -> tuple[BenchProfile, ...]:
     """Return the tests in the order of the bench's list, variants after them.
 
-    The bench's other procedures command a torque, not a position: diagnosis does not read
-    their logs.
+    The bench's other procedures command a torque, not a position, or are there for temperatures:
+    diagnosis does not read their logs.
+
+    Parameters
+    ----------
+    actuator : Actuator, optional
+        What stands on the bench; default: a turning servo, whose tests alone have variants.
     """
+    if actuator is not None and not turns(actuator):
+        return tuple(
+            BenchProfile(test.name, test.procedure, _parameters(test.procedure))
+            for test in standard_tests(actuator)
+        )
     out = []
     for name in _STANDARD:
         procedure = first_trace(load_procedure(name))
@@ -72,12 +101,34 @@ def _varied(
 
 def _parameters(procedure: Procedure) -> dict[str, str]:
     out: dict[str, str] = {}
+    forces = [step for step in procedure.step if isinstance(step, ForceStep)]
     for step in procedure.step:
         if isinstance(step, TraceStep):
-            out |= _stated("command", step.command.terms[0])
+            if step.command.terms:
+                out |= _stated("command", step.command.terms[0])
+            for action in step.command.steps:
+                out[f"action at {action.time}"] = str(action.action)
             out["duration"] = str(step.duration)
+        elif isinstance(step, SettingsStep):
+            out |= {path: str(value) for path, value in step.parameters.items()}
+        elif isinstance(step, ForceStep) and step is forces[-1]:
+            out |= _force(step)
         elif isinstance(step, BrakeStep) and step.terms:
             out |= _stated("brake", step.terms[0])
+    return out
+
+
+def _force(step: ForceStep) -> dict[str, str]:
+    """What the load actuator is commanded."""
+    out: dict[str, str] = {}
+    if step.opposing:
+        out["force.opposing"] = str(step.opposing)
+    if step.stiffness:
+        out["force.stiffness"] = str(step.stiffness)
+    if step.forces:
+        out["force.over the stroke"] = f"{min(step.forces):g} to {max(step.forces):g} N"
+    if step.terms:
+        out |= _stated("force", step.terms[0])
     return out
 
 

@@ -64,6 +64,8 @@ class Alarm(Plain):
         As of the window; the threshold is that of the ratio.
     causes : tuple of Cause
         Single faults, most probable first, given that one has begun.
+    whole : int
+        Windows behind the one with the onset that `causes` rest on; 0: on the alarm's own.
     """
 
     log: str
@@ -76,6 +78,7 @@ class Alarm(Plain):
     ratio: float
     threshold: float
     causes: tuple[Cause, ...]
+    whole: int = 0
 
 
 @dataclass(frozen=True)

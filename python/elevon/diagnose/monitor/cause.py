@@ -74,7 +74,7 @@ def _log_likelihood(
     shift = reference.shift(c.key, grid)
     linear, information = change.linear[0], change.information
     log = shift @ linear - 0.5 * np.einsum("mk,kl,ml->m", shift, information, shift)
-    error = np.abs(shift) * reference.case.errors
+    error = np.hypot(np.abs(shift) * reference.case.errors, reference.fault_error)
     error = np.hypot(
         error, [reference.case.uncertainty(c.key, float(s)) / reference.scale for s in grid]
     )

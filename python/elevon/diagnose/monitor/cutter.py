@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.monitor.filter import needed
@@ -17,6 +18,7 @@ from elevon.errors import FormatError, InputError
 from elevon.logs.clocks.quality import clock_quality
 from elevon.plain import Plain
 
+Bools = npt.NDArray[np.bool_]
 _FIRST = 200  # samples of a day that give its period
 _GAP = 1.5  # an interval longer than this many periods lacks samples
 _PORTION = 4096  # samples that are looked at together
@@ -108,6 +110,8 @@ class DayPlace(Plain):
         Earliest of the late samples since one was in time; NaN where there is none.
     first : tuple of float
         The day's first samples.
+    level : float
+        What was commanded, where windows are cut by that: at first, or last.
     """
 
     origin: float = math.nan
@@ -118,6 +122,7 @@ class DayPlace(Plain):
     seen: float = math.nan
     back: float = math.nan
     first: tuple[float, ...] = ()
+    level: float = math.nan
 
 
 @dataclass
@@ -259,11 +264,15 @@ class WindowCutter:
             return at, "begins" if at < len(time) else ""
         at = int(np.searchsorted(time, place.start + self.width))
         if math.isnan(place.fast):
-            moving = np.abs(values[:at, self.speed]) > self.fast
+            moving = self._moving(values[:at])
             moving &= np.isfinite(values[:at, self.needed]).all(axis=1)
             if moving.any():
                 return int(np.argmax(moving)), "moves"
         return at, "closes" if at < len(time) else ""
+
+    def _moving(self, values: Floats) -> Bools:
+        """At which samples the unit moves."""
+        return np.asarray(np.abs(values[:, self.speed]) > self.fast)
 
     def _push(self, time: Floats, values: Floats) -> None:
         if not len(time):

@@ -6,7 +6,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,27 +15,22 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.candidates import chosen
 from elevon.diagnose.monitor.answer import Alarm, Monitoring, MonitorStep
+from elevon.diagnose.monitor.by_positions import PositionWindows
+from elevon.diagnose.monitor.by_roles import RoleWindows
 from elevon.diagnose.monitor.cause import likely_causes
 from elevon.diagnose.monitor.cutter import CutWindow, DayPlace, SampleCounts, WindowCutter
 from elevon.diagnose.monitor.filter import ChangeFilter
 from elevon.diagnose.monitor.reference import WindowReference, reference
 from elevon.diagnose.monitor.samples import by_role
+from elevon.diagnose.monitor.settle import MOST, AlarmCause
 from elevon.diagnose.monitor.state import MonitorState, digest_of, read_state, write_state
-from elevon.diagnose.monitor.threshold import AlarmThresholds, simulated
-from elevon.diagnose.monitor.windows import (
-    Day,
-    motion,
-    period,
-    stream_roles,
-    top_speed,
-    usable,
-    window_features,
-)
+from elevon.diagnose.monitor.threshold import for_days
+from elevon.diagnose.monitor.windows import Day, Windows
 from elevon.errors import InputError
 from elevon.logs.brake import Brake
-from elevon.logs.drive import drive_channels, drive_log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -43,13 +38,10 @@ if TYPE_CHECKING:
     from elevon.logs.log import Log
 
 FALSE_ALARM_TIME = 3600.0  # s
-_WINDOWS = 40  # the most that are simulated of a day
-_DAYS = 10  # the most that are simulated
 _LAST = 16  # windows back to which a change is sought
-_SAME = 0.2  # relative difference of motion up to which a window is of the baselines' motion
 _LISTED = 20_000  # windows that are kept for the result
 _WHY = {
-    "rest": "at rest: the motion has not begun",
+    "rest": "at rest: the motion that is watched has not begun",
     "gap": "no samples",
     "late": "late: the samples came after their windows were closed",
 }
@@ -69,7 +61,8 @@ class Monitor:
     baselines : sequence of Log
         Of the healthy unit in the motion that is watched; three windows at least.
     window : float, optional
-        Width [s]: one period of the motion, or several. Default: the period of a noted sine.
+        Width [s]: one period of the motion, or several. Default: the period of a noted sine or of
+        the logged command; what the baselines' first action takes.
     false_alarm_time : float
         Mean time between false alarms [s].
     faults : sequence of str, optional
@@ -85,7 +78,7 @@ class Monitor:
     Raises
     ------
     InputError
-        Another wiring, no baseline, too few windows, a time or a width not above zero.
+        No baseline, too few windows, a time or a width not above zero, no repetition.
     """
 
     actuator: Actuator
@@ -102,14 +95,18 @@ class Monitor:
 
     def __post_init__(self) -> None:
         self._check()
-        self.baselines = [drive_log(log) for log in self.baselines]
+        self._candidates = chosen(self.faults, self.actuator)
+        kind = PositionWindows if turns(self.actuator) else RoleWindows
+        self._windows: Windows = kind(self.actuator, self.baselines, self.window)
+        self.baselines, self.width = self._windows.baselines, self._windows.width
         self.note = self.note or self.baselines[0].note
-        self._candidates = chosen(self.faults)
-        self.width = period(self.baselines[0], self.window)
-        self._reference = reference(self.actuator, self.baselines, self._candidates, self.width)
-        self.thresholds = self._simulated()
-        self._motion = motion(self.baselines[0])
-        self._top = top_speed(self.baselines[0])
+        self._reference = reference(self._windows, self._candidates)
+        if self.longest is None:
+            self.longest = max(log.duration for log in self.baselines)
+        self.thresholds = for_days(
+            self._reference, self.width, _LAST,
+            days=self.days, longest=self.longest, time=self.false_alarm_time,
+        )  # fmt: skip
         self._warn()
         self._begin()
 
@@ -127,12 +124,21 @@ class Monitor:
         self.skipped: Counter[str] = Counter()  # windows left out, by the reason
         self.top = 0.0  # the highest statistic
         self._left_out = 0
-        spread, directions = self._reference.spread, self._reference.directions
-        self._filter = ChangeFilter(spread, directions, streams=1, last=_LAST)
+        self._filter = self._new_filter()
+        self._cause: AlarmCause | None = None
         self._used: dict[int, MonitorStep] = {}  # windows back to which a change is sought
         self._opening = False
         self._day: Day | None = None
         self._cutter: WindowCutter | None = None
+
+    def _new_filter(self) -> ChangeFilter:
+        spread, directions = self._reference.spread, self._reference.directions
+        return ChangeFilter(spread, directions, streams=1, last=_LAST)
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """All that is read of a stream."""
+        return self._windows.roles
 
     @property
     def reference(self) -> WindowReference:
@@ -143,12 +149,14 @@ class Monitor:
         """Say that the unit was stopped: its temperatures and friction are another day's."""
         self._day = self._cutter = None
         self._filter.new_day()
+        if self._cause is not None:
+            self._cause.watch.new_day()
 
     def feed_log(self, item: Log) -> list[MonitorStep]:
         """Take a whole log, as a day of its own; return a step for each whole window."""
         self.new_day()
-        item = drive_channels(item)
-        day = Day.of(item)
+        item = self._windows.ready(item)
+        day = self._windows.day(item)
         self._open(day)
         steps = self._take(item.time, day.table(item))
         return steps + self.finish()
@@ -160,9 +168,10 @@ class Monitor:
         ----------
         samples : mapping of str to array_like, shape (n,)
             ``time`` and channels by role (or by a signal that has it), SI, NaN where a value is
-            missing: ``output_position``, ``motor_position``, ``speed_ref``, ``motor_speed``,
-            ``torque_current`` or ``current_ref`` or both; where there are any ``torque_voltage``
-            and ``brake_torque``. The same ones throughout a day. Samples that are late or doubled
+            missing: of a turning servo ``output_position``, ``motor_position``, ``speed_ref``,
+            ``motor_speed``, ``torque_current`` or ``current_ref`` or both; where there are any
+            ``torque_voltage`` and ``brake_torque``; of another actuator all `roles` of its
+            baselines. The same ones throughout a day. Samples that are late or doubled
             are left out, those out of order are put in their place; all are counted in the steps.
 
         Raises
@@ -171,8 +180,8 @@ class Monitor:
             A channel is missing or unknown, or not there all day; no finite time stamp; lengths
             that differ.
         """
-        time, channels = by_role(samples)
-        roles = stream_roles("stream", list(channels))
+        time, channels = by_role(samples, self.roles)
+        roles = self._windows.watched("stream", list(channels))
         if self._day is None:
             self.day += 1
             name = "stream" if self.day == 1 else f"stream, day {self.day}"
@@ -209,10 +218,11 @@ class Monitor:
             self._inputs, self.day, day.name if day else "", self.heading, day.roles if day else (),
             cutter.place if cutter else DayPlace(), cutter.pending if cutter else SampleCounts(),
             self.counts, dict(self.skipped), self._filter.windows, self.top, self._opening,
-            tuple(self._used.items()), self.alarm,
+            tuple(self._used.items()), self.alarm, self._cause.at if self._cause else None,
         )  # fmt: skip
         arrays = {} if cutter is None else cutter.stored()
-        write_state(path, state, arrays | self._filter.arrays())
+        of_cause = self._cause.arrays() if self._cause else {}
+        write_state(path, state, arrays | self._filter.arrays() | of_cause)
 
     def resume(self, path: str | os.PathLike[str]) -> None:
         """Go on from where `save` was called; `steps` begins anew.
@@ -225,12 +235,16 @@ class Monitor:
         state, arrays = read_state(path, self._inputs)
         self._begin()
         self._filter.take_arrays(arrays, state.windows, os.fspath(path))
+        if state.cause is not None:
+            self._cause = AlarmCause.stored(
+                self._new_filter(), arrays, state.cause, os.fspath(path)
+            )
         self.day, self.counts, self.top = state.day, state.counts, state.top
         self.heading = state.heading
         self.skipped, self.alarm = Counter(state.skipped), state.alarm
         self._opening, self._used = state.opening, dict(state.used)
         if state.name:
-            roles = stream_roles(os.fspath(path), state.roles)
+            roles = self._windows.watched(os.fspath(path), state.roles)
             self._open(Day(state.name, roles, self.note, Brake.none()))
             assert self._cutter is not None
             self._cutter.take_stored(state.place, state.pending, arrays, os.fspath(path))
@@ -282,7 +296,7 @@ class Monitor:
         return Monitoring(self.alarm, self.width, self.false_alarm_time, levels, steps, findings)
 
     def _open(self, day: Day) -> None:
-        self._day, self._cutter = day, day.cutter(self.width, self._top)
+        self._day, self._cutter = day, self._windows.cutter(day)
 
     def _take(self, time: Floats, table: Floats) -> list[MonitorStep]:
         assert self._cutter is not None
@@ -305,35 +319,16 @@ class Monitor:
         return step
 
     def _check(self) -> None:
-        if self.actuator.wiring != "rotary":
-            raise InputError(
-                f"{self.actuator.name}: watching serves the wiring 'rotary' so far, "
-                f"not {self.actuator.wiring!r}"
-            )
         if not self.baselines:
             raise InputError("watching needs a baseline: a healthy log of the same motion")
         if not self.false_alarm_time > 0.0:
             raise InputError(
                 f"mean time between false alarms {self.false_alarm_time:g} s: must be above zero"
             )
-
+        if self.window is not None and not self.window > 0.0:
+            raise InputError(f"window of {self.window:g} s: must be above zero")
         if self.longest is not None and not self.longest > 0.0:
             raise InputError(f"longest day of {self.longest:g} s: must be above zero")
-
-    def _simulated(self) -> AlarmThresholds:
-        if self.longest is None:
-            self.longest = max(log.duration for log in self.baselines)
-        windows = int(self.longest / self.width)
-        return simulated(
-            self._reference.spread,
-            self._reference.directions,
-            days=min(max(self.days, 1), _DAYS),
-            windows=min(max(windows, 2), _WINDOWS),
-            width=self.width,
-            time=self.false_alarm_time,
-            noise_degrees=self._reference.noise_degrees,
-            last=_LAST,
-        )
 
     def _warn(self) -> None:
         if self.thresholds.beyond:
@@ -355,28 +350,37 @@ class Monitor:
         )  # fmt: skip
         if step.skipped:
             return step
-        if not usable(window):
-            return replace(step, skipped="hardly any motion, or no samples")
-        item = drive_log(self._day.log(window))
-        if any(
-            abs(a - b) > _SAME * max(abs(a), abs(b))
-            for a, b in zip(motion(item), self._motion, strict=True)
-        ):
-            return replace(step, skipped="not the baselines' motion")
-        features = window_features(item, self.actuator)
-        if features is None:
-            return replace(step, skipped="hardly any motion, or no samples")
-        self._filter.step(self._reference.deviation(features)[None, :])
+        features = self._windows.read(self._day, window)
+        if isinstance(features, str):
+            return replace(step, skipped=features)
+        deviation = self._reference.deviation(features)[None, :]
+        self._settle(deviation)
+        before = deepcopy(self._filter) if self.alarm is None else self._filter
+        self._filter.step(deviation)
         ratios = [float(r[0]) for r in self._filter.ratios()]
         levels = [self.thresholds.opening, self.thresholds.within]
         parts = [r / level for r, level in zip(ratios, levels, strict=True)]
         top = int(np.argmax(parts))
         self._opening = top == 0
         step = replace(step, ratio=ratios[top], statistic=parts[top], alarm=parts[top] > 1.0)
+        if step.alarm and self.alarm is None:
+            change = self._filter.best(opening=self._opening)
+            self._cause = AlarmCause.behind(change, before, self._filter)
         self._used[self._filter.windows - 1] = step
         sought = {change.window for change in self._filter.changes}
         self._used = {number: s for number, s in self._used.items() if number in sought}
         return step
+
+    def _settle(self, deviation: Floats) -> None:
+        """Say the cause of an alarm anew, from whole windows behind the onset."""
+        if self.alarm is None or self._cause is None:
+            return
+        change, whole = self._cause.step(deviation), self.alarm.whole + 1
+        if change is not None:
+            causes = likely_causes(change, self._reference, self._candidates)
+            self.alarm = replace(self.alarm, causes=causes, whole=whole)
+        if change is None or whole >= MOST:
+            self._cause = None
 
     def _alarm(self, step: MonitorStep, *, opening: bool) -> Alarm:
         change = self._filter.best(opening=opening)

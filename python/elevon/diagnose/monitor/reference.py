@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,21 +11,13 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase
 from elevon.diagnose.engine.healthy import healthy
-from elevon.diagnose.engine.replay import replay
 from elevon.diagnose.engine.spread import DEGREES
-from elevon.diagnose.engine.table import FeatureVector
+from elevon.diagnose.engine.table import FeatureVector, deviations
 from elevon.diagnose.monitor.filter import WindowSpread
-from elevon.diagnose.monitor.windows import stretch, window_features, windows_of
-from elevon.diagnose.positions.log import RUN_IN
-from elevon.diagnose.positions.reading import PositionReading
+from elevon.diagnose.monitor.windows import Windows
 from elevon.errors import InputError
 
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator
-    from elevon.logs.log import Log
-
 MEMORY = 3600.0  # s, ASSUMED: time in which a day's temperatures and friction become another day's
-_MODELLED = 20.0  # s of a baseline that the model runs
 _LEAST = 3  # windows of the baselines together
 
 
@@ -48,6 +39,8 @@ class WindowReference:
         What the severities that were run do.
     windows : int
         Of the baselines.
+    fault_error : ndarray, shape (k,)
+        Least deviation of what the model says a fault does.
     """
 
     names: tuple[str, ...]
@@ -56,6 +49,7 @@ class WindowReference:
     scale: Floats
     directions: Floats
     windows: int
+    fault_error: Floats
 
     @property
     def noise_degrees(self) -> float:
@@ -73,12 +67,7 @@ class WindowReference:
         return self.case.shift(key, severity) / self.scale
 
 
-def reference(
-    actuator: Actuator,
-    baselines: Sequence[Log],
-    candidates: Sequence[CandidateFault],
-    width: float,
-) -> WindowReference:
+def reference(windows: Windows, candidates: Sequence[CandidateFault]) -> WindowReference:
     """Join the model's spread with the windows of the baselines.
 
     Raises
@@ -86,40 +75,41 @@ def reference(
     InputError
         Fewer than three windows in which the unit moves.
     """
-    features = [
-        [e for w in windows_of(b, width) if (e := window_features(w, actuator))] for b in baselines
-    ]
+    features = [list(windows.of(log)) for log in windows.baselines]
     count = sum(map(len, features))
     if count < _LEAST:
         raise InputError(
-            f"the baselines have {count} windows of {width:g} s in which the unit moves both "
-            f"ways; {_LEAST} are needed, better thirty; a motion that does not repeat within a "
-            "baseline is not watched: elevon diagnose takes its log as a whole"
+            f"the baselines have {count} windows of {windows.width:g} s in which the unit moves "
+            f"as it is watched; {_LEAST} are needed, better thirty; a motion that does not repeat "
+            "within a baseline is not watched: elevon diagnose takes its log as a whole"
         )
     features = [log for log in features if log]
-    reach = max(_MODELLED, 2.0 * width) + RUN_IN
-    model = replay(PositionReading(stretch(baselines[0], 0.0, reach), actuator), candidates)
+    model = windows.model(candidates)
     names = [n for n in model.healthy.names if all(n in e.names for log in features for e in log)]
     rows = [np.array([e.only(names).values for e in log]) for log in features]
-    noise = _noise(rows, np.array([e.only(names).std for log in features for e in log]))
+    error = np.mean(np.array([e.only(names).std for log in features for e in log]) ** 2, axis=0)
+    least = deviations([model.table[n] for n in names], np.vstack(rows).mean(axis=0), "repeats")
+    error += (windows.within_day * least) ** 2
+    noise = _noise(rows, error)
     means = [
         FeatureVector(tuple(names), log.mean(axis=0), np.sqrt(np.diag(noise) / len(log)))
         for log in rows
     ]
     unit = healthy(model, names, means)
-    case = LogCase(baselines[0].name, replace(means[0]), unit, model)
-    return _scaled(case, noise, width, candidates, count)
+    case = LogCase(windows.baselines[0].name, replace(means[0]), unit, model)
+    made = _scaled(case, noise, windows.width, candidates, count)
+    return replace(made, fault_error=windows.of_faults * least / made.scale)
 
 
-def _noise(rows: Sequence[Floats], std: Floats) -> Floats:
+def _noise(rows: Sequence[Floats], square: Floats) -> Floats:
     """Covariance from window to window.
 
-    The baselines' scatter, and what each window says of itself, worth `DEGREES` windows.
+    The baselines' scatter, and what each window says of itself (its square), worth `DEGREES`
+    windows.
     """
     scatter = sum((log - log.mean(axis=0)).T @ (log - log.mean(axis=0)) for log in rows)
     free = sum(len(log) - 1 for log in rows)
-    error = np.diag(np.mean(std**2, axis=0))
-    return np.asarray((DEGREES * error + scatter) / (DEGREES + free))
+    return np.asarray((DEGREES * np.diag(square) + scatter) / (DEGREES + free))
 
 
 def _scaled(
@@ -139,5 +129,6 @@ def _scaled(
     size = np.linalg.norm(directions, axis=1)
     seen = size > 1e-6
     return WindowReference(
-        unit.names, case, spread, scale, directions[seen] / size[seen, None], count
-    )
+        unit.names, case, spread, scale, directions[seen] / size[seen, None], count,
+        np.zeros(len(scale)),
+    )  # fmt: skip

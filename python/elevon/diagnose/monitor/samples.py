@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.monitor.windows import ROLES
 from elevon.errors import InputError, unknown
 from elevon.logs.maps.signals import known_roles, known_signals
 
 LATEST = 1e12  # s: a time stamp beyond that is none
 
 
-def by_role(samples: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, Floats]]:
+def by_role(
+    samples: Mapping[str, npt.ArrayLike], read: Collection[str]
+) -> tuple[Floats, dict[str, Floats]]:
     """Return time stamps, shape (n,), and channels by role, of samples by role or signal.
+
+    Signals whose role is not among those that are read are left out.
 
     Raises
     ------
@@ -26,7 +29,7 @@ def by_role(samples: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, Flo
     """
     out: dict[str, Floats] = {}
     for name, values in samples.items():
-        role = _role(name)
+        role = _role(name, read)
         if role in out:
             raise InputError(f"stream: {name!r} has the role {role}, and so has another channel")
         if role:
@@ -44,15 +47,15 @@ def by_role(samples: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, Flo
     return time, out
 
 
-def _role(name: str) -> str:
+def _role(name: str, read: Collection[str]) -> str:
     """Return the role of a name; empty of a signal that nothing here reads."""
-    if name in ROLES or name in known_roles():
+    if name in read or name in known_roles():
         return name
     signals = known_signals()
     if name not in signals:
         raise unknown("channel", name, [*known_roles(), *signals], "stream")
     role = signals[name].role
-    return role if role in ROLES else ""
+    return role if role in read else ""
 
 
 def _column(name: str, values: npt.ArrayLike) -> Floats:

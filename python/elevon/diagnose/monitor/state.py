@@ -62,9 +62,11 @@ class MonitorState(Plain):
         Windows back to which a change is sought.
     alarm : Alarm or None
         The first one.
+    cause : (int, int) or None
+        Of the filter of the alarm's cause: windows it has seen, and the first with the fault.
     """
 
-    LAYOUT: ClassVar = 1
+    LAYOUT: ClassVar = 2
 
     inputs: Mapping[str, str]
     day: int
@@ -80,6 +82,7 @@ class MonitorState(Plain):
     opening: bool
     used: tuple[tuple[int, MonitorStep], ...]
     alarm: Alarm | None
+    cause: tuple[int, int] | None = None
 
 
 def digest_of(logs: Sequence[Log]) -> str:

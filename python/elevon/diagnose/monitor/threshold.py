@@ -9,9 +9,12 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.diagnose.engine.spread import DEGREES
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread
+from elevon.diagnose.monitor.reference import WindowReference
 
 STREAMS = 2000
 _TAIL = 0.05  # share of the streams that gives the tail
+_WINDOWS = 40  # the most that are simulated of a day
+_DAYS = 10  # the most that are simulated
 _LEAST = 10  # streams above a threshold that is read off; beyond, the tail is drawn on
 
 
@@ -31,6 +34,22 @@ class AlarmThresholds:
     opening: float
     within: float
     beyond: bool
+
+
+def for_days(
+    reference: WindowReference, width: float, last: int, *, days: int, longest: float, time: float
+) -> AlarmThresholds:
+    """Return the thresholds of so many days, the longest of so many seconds; as `simulated`."""
+    return simulated(
+        reference.spread,
+        reference.directions,
+        days=min(max(days, 1), _DAYS),
+        windows=min(max(int(longest / width), 2), _WINDOWS),
+        width=width,
+        time=time,
+        noise_degrees=reference.noise_degrees,
+        last=last,
+    )
 
 
 def simulated(

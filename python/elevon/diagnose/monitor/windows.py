@@ -1,9 +1,13 @@
-"""Windows of a stream: stretches of a log, and the features of each."""
+"""Windows of a stream: what is read of each, the same of a log and of samples as they come.
+
+A turning servo's windows are read by its positions, any other actuator's by the roles of its logs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,95 +15,19 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.monitor.cutter import CutWindow, WindowCutter
-from elevon.diagnose.positions.command import noted_command
-from elevon.diagnose.positions.log import RUN_IN
-from elevon.diagnose.positions.reading import logged_features
-from elevon.errors import InputError
 from elevon.logs.brake import Brake
-from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.diagnose.engine.candidates import CandidateFault
+    from elevon.diagnose.engine.replay import Replay
     from elevon.logs.command.note import CommandNote
 
-_LEAST = 400  # samples of a window that may be used
-_MOVING = 0.1  # of the highest speed
-_COUNTS = "good"  # a channel of ours: NaN where a sample of a log does not count
-#: Without these, and one of the currents, a stream cannot be watched.
-NEEDED = ("speed_ref", "motor_speed", "motor_position", "output_position")
-CURRENTS = ("torque_current", "current_ref")  # the measured one first
-#: All that is read of a stream. ``brake_torque``: on the motor's shaft [N m], as a baseline's load
-#: cell gives it.
-ROLES = (*NEEDED, *CURRENTS, "torque_voltage", "brake_torque")
-
-
-def period(log: Log, window: float | None) -> float:
-    """Return the width of a window [s]: the one given, or one period of a noted sine.
-
-    Raises
-    ------
-    InputError
-        Neither is there, or a window is not positive.
-    """
-    if window is not None:
-        if not window > 0.0:
-            raise InputError(f"window of {window:g} s: must be above zero")
-        return window
-    note = log.note
-    frequency = note.parameters.get("frequency", 0.0) if note is not None else 0.0
-    if note is None or note.waveform != "sine" or not frequency > 0.0:
-        raise InputError(
-            f"{log.name}: its note names no sine, so the window must be given: one period of the "
-            "motion, or a whole number of them; a motion that does not repeat (a chirp, a brake on "
-            "a ramp) is not watched: elevon diagnose takes such a log as a whole"
-        )
-    return 1.0 / frequency
-
-
-def top_speed(log: Log) -> float:
-    """Return the highest motor speed of a log [rad/s]."""
-    return float(np.nanmax(np.where(log.good, np.abs(log.speed), 0.0), initial=0.0))
-
-
-def windows_of(log: Log, width: float) -> Iterator[Log]:
-    """Yield the whole windows of a log in which its unit may move, as a monitor cuts them."""
-    day = Day.of(log)
-    cutter = day.cutter(width, top_speed(log))
-    for window in [*cutter.take(log.time, day.table(log)), *cutter.finish()]:
-        if window.why == "window" and usable(window):
-            yield drive_log(day.log(window))
-
-
-def stretch(log: Log, first: float, last: float) -> Log:
-    """Return a part of a log, on a clock of its own."""
-    return log.part((log.time >= first) & (log.time < last), first, last)
-
-
-def usable(window: CutWindow) -> bool:
-    """Whether a window has enough samples that count."""
-    return window.counts.taken - window.counts.empty >= _LEAST
-
-
-def window_features(log: Log, actuator: Actuator) -> FeatureVector | None:
-    """Return the features of a window; None where it does not move both ways or lacks samples."""
-    if not log.has("output_position", "motor_position"):
-        raise InputError(f"{log.name}: watching needs both positions")
-    good = log.good & np.isfinite(log.motor) & np.isfinite(log.output)
-    top = float(np.abs(log.speed[good]).max()) if good.any() else 0.0
-    ways = [int((good & (way * log.speed > _MOVING * top)).sum()) for way in (1.0, -1.0)]
-    if good.sum() < _LEAST or top < 1.0 or min(ways) < _LEAST // 4:
-        return None
-    noted = noted_command(log, actuator.parameters.value("control.speed_limit"))
-    gain = None if noted is None else (noted.gain, noted.gain_std)
-    return logged_features(replace(log, gain=gain, good=good), actuator)
-
-
-def motion(log: Log) -> tuple[float, float, float]:
-    """Return what tells one motion from another: spread of position, RMS speed, brake's mean."""
-    brake = float(np.mean(log.brake.level)) if log.brake.measured and len(log.brake.level) else 0.0
-    speed = float(np.sqrt(np.nanmean(log.speed**2)))
-    return float(np.nanstd(log.output)), speed, brake
+COUNTS = "good"  # a channel of ours: NaN where a sample of a log does not count
+SAME = 0.2  # relative difference of motion up to which a window is of the baselines' motion
+NO_MOTION = "hardly any motion, or no samples"
+OTHER = "not the baselines' motion"
 
 
 @dataclass(frozen=True)
@@ -123,55 +51,121 @@ class Day:
     note: CommandNote | None
     brake: Brake
 
-    @classmethod
-    def of(cls, log: Log) -> Day:
-        """Return the day that a log is."""
-        roles = stream_roles(log.name, list(log.channels))
-        return cls(log.name, roles if log.good.all() else (*roles, _COUNTS), log.note, log.brake)
-
-    @staticmethod
-    def _good(log: Log) -> Floats:
-        return np.where(log.good, 1.0, np.nan)
-
     def table(self, log: Log) -> Floats:
         """Return the channels of a log, shape (n, c)."""
-        return np.column_stack(
-            [self._good(log) if role == _COUNTS else log[role] for role in self.roles]
-        )
+        good = np.where(log.good, 1.0, np.nan)
+        return np.column_stack([good if role == COUNTS else log[role] for role in self.roles])
 
-    def cutter(self, width: float, top: float) -> WindowCutter:
-        """Return what cuts the day; `top` is the highest speed of the motion."""
-        current = next(role for role in CURRENTS if role in self.roles)
-        needed = [self.roles.index(role) for role in (*NEEDED, current)]
-        needed += [self.roles.index(role) for role in self.roles if role == _COUNTS]
-        speed = self.roles.index("motor_speed")
-        return WindowCutter(width, RUN_IN, _MOVING * top, speed, needed)
+    def at(self, *roles: str) -> list[int]:
+        """Return where channels stand, and the one that says which samples count."""
+        return [k for k, role in enumerate(self.roles) if role in (*roles, COUNTS)]
 
-    def log(self, window: CutWindow) -> Log:
+    def log(self, window: CutWindow, units: Mapping[str, str] | None = None) -> Log:
         """Return a window as a log of its own, as it came."""
         channels = {role: window.values[:, k] for k, role in enumerate(self.roles)}
-        good = np.isfinite(channels.pop(_COUNTS, np.zeros(len(window.time))))
+        good = np.isfinite(channels.pop(COUNTS, np.zeros(len(window.time))))
         level, brake = channels.pop("brake_torque", None), self.brake
         if level is not None:
             brake = Brake("torque", window.time, level)
-        log = Log(self.name, window.time, channels, good=good, note=self.note, brake=brake)
+        log = Log(
+            self.name, window.time, channels, units or {}, good=good, note=self.note, brake=brake
+        )
         return log.part(np.ones(len(window.time), dtype=np.bool_), window.start, window.end)
 
 
-def stream_roles(name: str, roles: Sequence[str]) -> tuple[str, ...]:
-    """Return those roles that are watched.
+class Windows(ABC):
+    """What is read of the windows of one motion.
 
-    Raises
-    ------
-    InputError
-        One that is needed is missing.
+    Attributes
+    ----------
+    actuator : Actuator
+        The healthy unit.
+    baselines : list of Log
+        Of it, ready.
+    width : float
+        Of a window [s].
+    roles : tuple of str
+        All that is read of a stream.
+    within_day : float
+        Least deviation from window to window, over that from day to day.
+    of_faults : float
+        Least deviation of what the model says a fault does to a number, likewise.
     """
-    missing = [role for role in NEEDED if role not in roles]
-    if not any(role in roles for role in CURRENTS):
-        missing.append(" or ".join(CURRENTS))
-    if missing:
-        raise InputError(
-            f"{name}: no channel has the role {', '.join(missing)}; watching needs both positions, "
-            f"speed, its set point and a torque current; roles: {', '.join(roles) or 'none'}"
-        )
-    return tuple(role for role in ROLES if role in roles)
+
+    actuator: Actuator
+    baselines: list[Log]
+    width: float
+    roles: tuple[str, ...]
+    within_day: float = 0.0
+    of_faults: float = 0.0
+
+    @abstractmethod
+    def ready(self, log: Log) -> Log:
+        """Return a log as it is fed: on one clock, its gaps as they are."""
+
+    @abstractmethod
+    def watched(self, name: str, roles: Sequence[str]) -> tuple[str, ...]:
+        """Return those roles of a day that are watched.
+
+        Raises
+        ------
+        InputError
+            One that is needed is missing.
+        """
+
+    @abstractmethod
+    def cutter(self, day: Day) -> WindowCutter:
+        """Return what cuts a day."""
+
+    @abstractmethod
+    def read(self, day: Day, window: CutWindow, *, any_motion: bool = False) -> FeatureVector | str:
+        """Return the features of a window, or why it is not used.
+
+        Parameters
+        ----------
+        day : Day
+            Of the window.
+        window : CutWindow
+            As it was cut.
+        any_motion : bool
+            Whether its motion may be another than the baselines'.
+        """
+
+    @abstractmethod
+    def model(self, candidates: Sequence[CandidateFault]) -> Replay:
+        """Return what the model shows in a window, healthy and with each fault."""
+
+    def day(self, log: Log) -> Day:
+        """Return the day that a log is."""
+        roles = self.watched(log.name, list(log.channels))
+        return Day(log.name, roles if log.good.all() else (*roles, COUNTS), log.note, log.brake)
+
+    def of(self, log: Log) -> Iterator[FeatureVector]:
+        """Yield the features of the whole windows of a log in which its unit moves."""
+        for day, window in self.cut(log):
+            got = self.read(day, window, any_motion=True)
+            if not isinstance(got, str):
+                yield got
+
+    def cut(self, log: Log) -> Iterator[tuple[Day, CutWindow]]:
+        """Yield the whole windows of a log's motion, as a monitor cuts them."""
+        day = self.day(log)
+        cutter = self.cutter(day)
+        for window in [*cutter.take(log.time, day.table(log)), *cutter.finish()]:
+            if window.why == "window":
+                yield day, window
+
+
+def stretch(log: Log, first: float, last: float) -> Log:
+    """Return a part of a log, on a clock of its own."""
+    return log.part((log.time >= first) & (log.time < last), first, last)
+
+
+def usable(window: CutWindow, least: int) -> bool:
+    """Whether a window has enough samples that count."""
+    return window.counts.taken - window.counts.empty >= least
+
+
+def apart(a: Sequence[float], b: Sequence[float]) -> bool:
+    """Whether two motions differ in one of their numbers."""
+    return any(abs(x - y) > SAME * max(abs(x), abs(y)) for x, y in zip(a, b, strict=True))

@@ -28,26 +28,38 @@ _EXACT = 2e-4  # of the command's range: what straight lines may miss
 _QUIET = 1e-3  # of the command's range: below it nothing is commanded
 
 
-def role_log(log: Log, actuator: Actuator) -> RoleReading:
+def role_log(log: Log, actuator: Actuator, *, until: float | None = None) -> RoleReading:
     """Read a log by its roles, on one even clock counted from its onset.
+
+    Parameters
+    ----------
+    log : Log
+        As it was recorded.
+    actuator : Actuator
+        The healthy unit.
+    until : float, optional
+        Instant of the log up to which it is read [s]; default: in steps of a tenth of its length,
+        so that logs of one test are read alike.
 
     Raises
     ------
     InputError
         No command, nothing commanded, nothing recorded, too short, or nothing moves.
     """
-    log, lost = _complete(log)
+    log, lost = complete(log)
     time, name = log.time, log.name
     actions = _actions(actuator.wiring)
     first = _onset(time, log["command"], sequence=bool(actions), name=name)
     rate = 1.0 / float(np.median(np.diff(time)))
     seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
+    if until is not None:
+        seconds = until - first
     clock = np.arange(-round(BEFORE * rate), round(seconds * rate) + 1) / rate
     at = np.clip(clock + first, time[0], time[-1])
     channels = {r: on_clock(time, v, at, log.units[r]) for r, v in log.channels.items()}
     _check_motion(channels, name)
     findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
-    if time[-1] - first > _LONGEST * (1.0 + _LADDER):
+    if until is None and time[-1] - first > _LONGEST * (1.0 + _LADDER):
         findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
     ready = replace(
         log, time=clock, channels=channels, good=np.ones(len(clock), dtype=np.bool_),
@@ -56,7 +68,7 @@ def role_log(log: Log, actuator: Actuator) -> RoleReading:
     return _reading(log, ready, actuator, rate=rate, seconds=seconds, findings=findings)
 
 
-def _complete(log: Log) -> tuple[Log, list[str]]:
+def complete(log: Log) -> tuple[Log, list[str]]:
     """The log on its command's clock, gaps bridged; roles with too many gaps are named."""
     if not log.has("command"):
         raise InputError(
