@@ -3,7 +3,7 @@
 import numpy as np
 
 from elevon import Actuator
-from elevon.calibrate.closed_loop import loop_log
+from elevon.calibrate.stages.closed_loop import loop_log
 from elevon.logs.log import Log
 from tests.calibrate.linear import Linear
 

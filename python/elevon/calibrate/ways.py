@@ -169,15 +169,15 @@ class _ClosedLoop:
 
     @cached_property
     def logs(self) -> list[Log]:
-        from elevon.calibrate.closed_loop import loop_log
+        from elevon.calibrate.stages.closed_loop import loop_log
 
         return [loop_log(log) for log in self.given]
 
     def calibrate(
         self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
     ) -> Calibration:
-        from elevon.calibrate.closed_loop import calibrate_loop
-        from elevon.calibrate.closed_loop.predict import validate_loop
+        from elevon.calibrate.stages.closed_loop import calibrate_loop
+        from elevon.calibrate.stages.closed_loop.predict import validate_loop
 
         _check_loop(actuator, request)
         result = calibrate_loop(
@@ -194,7 +194,7 @@ class _ClosedLoop:
         transient: float | None,
         progress: Progress | None,  # noqa: ARG002 - a few runs
     ) -> Validation:
-        from elevon.calibrate.closed_loop.predict import validate_loop
+        from elevon.calibrate.stages.closed_loop.predict import validate_loop
 
         return validate_loop(self.logs, actuator, transient)
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from elevon.actuator import Actuator
-from elevon.calibrate.closed_loop.log import NAMES, recorded_roles, sigma, unsigned
+from elevon.calibrate.stages.closed_loop.log import NAMES, recorded_roles, sigma, unsigned
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.errors import unknown
 from elevon.estimate import Free

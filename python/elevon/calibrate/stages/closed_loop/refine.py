@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.calibrate.closed_loop.fit import Searched
-from elevon.calibrate.closed_loop.free import LOAD_SHARE, free_list
-from elevon.calibrate.closed_loop.log import motion
-from elevon.calibrate.closed_loop.model import LoopModel
-from elevon.calibrate.closed_loop.start import windows
+from elevon.calibrate.stages.closed_loop.fit import Searched
+from elevon.calibrate.stages.closed_loop.free import LOAD_SHARE, free_list
+from elevon.calibrate.stages.closed_loop.log import motion
+from elevon.calibrate.stages.closed_loop.model import LoopModel
+from elevon.calibrate.stages.closed_loop.start import windows
 from elevon.estimate.free import inner, outer
 from elevon.logs.log import Log
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.log import motion, unsigned, window
-from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.calibrate.stages.closed_loop.log import motion, unsigned, window
+from elevon.calibrate.stages.closed_loop.model import LoopModel
 from elevon.estimate import Free
 from elevon.estimate.free import inner
 from elevon.logs.log import Log

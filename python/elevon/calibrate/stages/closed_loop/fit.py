@@ -10,9 +10,9 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.free import asked_for, free_list
-from elevon.calibrate.closed_loop.model import LoopModel
-from elevon.calibrate.closed_loop.start import cloud, first_values, windows
+from elevon.calibrate.stages.closed_loop.free import asked_for, free_list
+from elevon.calibrate.stages.closed_loop.model import LoopModel
+from elevon.calibrate.stages.closed_loop.start import cloud, first_values, windows
 from elevon.estimate import Free
 from elevon.estimate.free import inner, outer
 from elevon.estimate.held_out import folds

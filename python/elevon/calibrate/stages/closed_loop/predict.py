@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from elevon.actuator import Actuator
-from elevon.calibrate.closed_loop.fit import Fitted, parts_apart, refitted
-from elevon.calibrate.closed_loop.free import STICK, in_set
-from elevon.calibrate.closed_loop.log import NAMES
-from elevon.calibrate.closed_loop.model import LoopModel
+from elevon.calibrate.stages.closed_loop.fit import Fitted, parts_apart, refitted
+from elevon.calibrate.stages.closed_loop.free import STICK, in_set
+from elevon.calibrate.stages.closed_loop.log import NAMES
+from elevon.calibrate.stages.closed_loop.model import LoopModel
 from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.errors import InputError, unknown
 from elevon.estimate.free import outer

@@ -8,8 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.calibrate.closed_loop.exchange import exchanged
-from elevon.calibrate.closed_loop.fit import (
+from elevon.calibrate.named import named
+from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.stages.closed_loop.exchange import exchanged
+from elevon.calibrate.stages.closed_loop.fit import (
     Fitted,
     Searched,
     as_given,
@@ -17,14 +19,13 @@ from elevon.calibrate.closed_loop.fit import (
     final_fit,
     search,
 )
-from elevon.calibrate.closed_loop.free import CURRENT_GAIN, STICK, STRUCTURES, in_set
-from elevon.calibrate.closed_loop.intervals import Knowledge, Silence, known
-from elevon.calibrate.closed_loop.predict import held_out_errors, traces_of, units_of
-from elevon.calibrate.closed_loop.refine import refined
-from elevon.calibrate.named import named
-from elevon.calibrate.outcome import Calibration, by_path, log_facts
-from elevon.calibrate.validation import SignalError
-from elevon.errors import InputError, Interrupted, unknown
+from elevon.calibrate.stages.closed_loop.free import CURRENT_GAIN, STICK, STRUCTURES, in_set
+from elevon.calibrate.stages.closed_loop.intervals import Knowledge, Silence, known
+from elevon.calibrate.stages.closed_loop.predict import held_out_errors, traces_of, units_of
+from elevon.calibrate.stages.closed_loop.refine import refined
+from elevon.calibrate.stages.context import Context, Stage, run_stages
+from elevon.calibrate.validation import SignalError, Validation
+from elevon.errors import InputError, unknown
 from elevon.estimate import Estimate, quantile
 from elevon.logs.log import Log
 from elevon.parameters.relations import static_following
@@ -80,59 +81,148 @@ def calibrate_loop(
     """
     begin = clock.perf_counter()
     _check(logs, actuator, structure)
-    say = _Reporter(progress)
-    logs = _late(logs, transient)
-    if free is not None:
-        searched = [as_given(actuator, logs, free)]
-    else:
-        searched = _searched(actuator, logs, structure, seed, say)
-    chosen, why = choose(searched)
-    servo = actuator
-    if free is None:
-        servo, chosen = refined(actuator, logs, chosen, check=say.go)
-    fitted = final_fit(servo, logs, chosen, check=say.go, advance=lambda f: say(0.6 + 0.35 * f))
-    fitted, unsettled = exchanged(fitted, actuator)
-    validated = held_out_errors(fitted)
-    estimates, missing = _settled(fitted, logs, actuator, unsettled, free)
-    say(1.0)
-    tried = {item.structure: item.held_out for item in searched if np.isfinite(item.held_out)}
+    context = LoopContext(_late(logs, transient), actuator, structure, free, seed, progress)
+    run_stages(LOOP_STAGES, context, 0.0, 1.0)
+    fitted = context.fitted
+    context.go(1.0)
     return Calibration(
-        actuator=_with(servo, fitted, chosen.structure, missing),
+        actuator=_with(context.servo, fitted, context.chosen.structure, context.reasons),
         before=actuator,
-        logs=log_facts(logs),
-        parameters=by_path(estimates),
-        undetermined=missing,
-        facts={
-            "structure": {"chosen": chosen.structure, "why": why, "held_out": tried},
-            "agreement": agreement(fitted),
-            "held_out": validated.errors,
-            "logger": {p: v for p, v in fitted.values.items() if not in_set(p) or p == STICK},
-        },
-        promise=validated,
+        logs=log_facts(context.logs),
+        parameters=by_path(context.estimates),
+        undetermined=context.reasons,
+        facts=context.facts,
+        promise=context.promise,
         wall_s=clock.perf_counter() - begin,
     )
+
+
+class LoopContext(Context):
+    """What a calibration in closed loop knows as its stages go on.
+
+    Attributes
+    ----------
+    structure : str or None
+        The only one tried.
+    free : sequence of str or None
+        Paths requested.
+    seed : int
+        Of the search's starts.
+    servo : Actuator
+        The model that is fitted: as given, with what a search leaves out.
+    chosen : Searched
+        The structure, and where its fit begins.
+    fitted : Fitted
+        The fit on whole logs.
+    promise : Validation
+        What values fitted to the other logs predict of each.
+    unsettled : dict of str to str
+        What the logs follow alike with two values, and why.
+    estimates : list of Estimate
+        What is determined.
+    """
+
+    servo: Actuator
+    chosen: Searched
+    fitted: Fitted
+    promise: Validation
+    estimates: list[Estimate]
+
+    def __init__(  # noqa: PLR0917 - what the caller states
+        self,
+        logs: Sequence[Log],
+        actuator: Actuator,
+        structure: str | None,
+        free: Sequence[str] | None,
+        seed: int,
+        progress: Progress | None,
+    ) -> None:
+        super().__init__(logs, actuator, progress=progress)
+        self.structure, self.free, self.seed = structure, free, seed
+        self.servo = actuator
+        self.unsettled: dict[str, str] = {}
+        self._fraction = 0.0
+
+    def go(self, fraction: float) -> None:
+        """Report progress, which never falls; stop where it says so."""
+        self._fraction = max(self._fraction, fraction)
+        super().go(self._fraction)
+
+    def goes_on(self) -> bool:
+        """Whether progress lets it go on."""
+        return self.progress is None or self.progress(self._fraction) is not False
+
+
+def _structure(ctx: LoopContext) -> None:
+    """Search one structure, or each, and take the one that predicts what was left out."""
+    if ctx.free is not None:
+        searched = [as_given(ctx.actuator, ctx.logs, ctx.free)]
+    else:
+        searched = _searched(ctx)
+    ctx.chosen, why = choose(searched)
+    tried = {item.structure: item.held_out for item in searched if np.isfinite(item.held_out)}
+    ctx.facts["structure"] = {"chosen": ctx.chosen.structure, "why": why, "held_out": tried}
+
+
+def _fit(ctx: LoopContext) -> None:
+    """Fit whole logs."""
+    if ctx.free is None:
+        ctx.servo, ctx.chosen = refined(ctx.actuator, ctx.logs, ctx.chosen, check=ctx.goes_on)
+    ctx.fitted = final_fit(
+        ctx.servo, ctx.logs, ctx.chosen, check=ctx.goes_on,
+        advance=lambda fraction: ctx.go(0.6 + 0.35 * fraction),
+    )  # fmt: skip
+
+
+def _exchange(ctx: LoopContext) -> None:
+    """Settle two gains that change places."""
+    ctx.fitted, ctx.unsettled = exchanged(ctx.fitted, ctx.actuator)
+
+
+def _hold_out(ctx: LoopContext) -> None:
+    """Predict each log by values fitted to the others."""
+    ctx.promise = held_out_errors(ctx.fitted)
+
+
+def _numbers(ctx: LoopContext) -> None:
+    """Say what is determined, with intervals, and what is not."""
+    ctx.estimates, ctx.reasons = _settled(ctx)
+    values = ctx.fitted.values
+    ctx.facts |= {
+        "agreement": agreement(ctx.fitted),
+        "held_out": ctx.promise.errors,
+        "logger": {p: v for p, v in values.items() if not in_set(p) or p == STICK},
+    }
+
+
+_SERVO = "control.pid_gain"  # every servo has it
+LOOP_STAGES = (
+    Stage("structure", _SERVO, "command, one channel of the motion that moves enough",
+          "cascade or PID", _structure),
+    Stage("closed loop", _SERVO, "the same; torque_current for torques, not ratios alone",
+          "gains, limits, inertia, friction, delays and offsets of the logger", _fit),
+    Stage("gains that change places", _SERVO, "a speed set point at its limit tells them apart",
+          "position gain, integral time", _exchange),
+    Stage("hold-out", _SERVO, "two logs, or one in halves", "errors of what is predicted",
+          _hold_out),
+    Stage("intervals", _SERVO, "the fit", "what is determined, and how well", _numbers),
+)  # fmt: skip
 
 
 #: A cascade's speed limit has no meaning as it was given for a PID.
 _CASCADE = ("cascade", "control.speed_limit")
 
 
-def _settled(
-    fitted: Fitted,
-    logs: Sequence[Log],
-    actuator: Actuator,
-    unsettled: Mapping[str, str],
-    free: Sequence[str] | None,
-) -> tuple[list[Estimate], dict[str, str]]:
+def _settled(ctx: LoopContext) -> tuple[list[Estimate], dict[str, str]]:
     """What the logs determine (of what was requested), and what they do not."""
-    estimates, missing = _estimates(*known(fitted), actuator)
-    more = dict(unsettled)
-    if free is None:
-        more |= _ratios_only(estimates, logs, fitted)
+    estimates, missing = _estimates(*known(ctx.fitted), ctx.actuator)
+    more = dict(ctx.unsettled)
+    if ctx.free is None:
+        more |= _ratios_only(estimates, ctx.logs, ctx.fitted)
     estimates = [item for item in estimates if item.path not in more]
     missing |= more
-    if free is not None:
-        estimates = _requested(estimates, missing, free)
+    if ctx.free is not None:
+        estimates = _requested(estimates, missing, ctx.free)
     if not estimates:
         raise InputError("the logs determine no parameter: nothing in them moves enough")
     return estimates, missing
@@ -163,26 +253,21 @@ def _late(logs: Sequence[Log], transient: float | None) -> list[Log]:
     return [log.counting(log.time >= transient) for log in logs]
 
 
-def _searched(
-    actuator: Actuator,
-    logs: Sequence[Log],
-    structure: str | None,
-    seed: int,
-    say: _Reporter,
-) -> list[Searched]:
+def _searched(ctx: LoopContext) -> list[Searched]:
     """Search one structure, or each."""
-    tried = [structure] if structure else list(STRUCTURES)
+    tried = [ctx.structure] if ctx.structure else list(STRUCTURES)
     each = 0.6 / len(tried)
 
     def share(k: int) -> Callable[[float], None]:
-        return lambda fraction: say(each * (k + fraction))
+        return lambda fraction: ctx.go(each * (k + fraction))
 
     return [
         search(
-            actuator, logs, name, seed=seed, alone=len(tried) == 1, check=say.go, advance=share(k)
+            ctx.actuator, ctx.logs, name, seed=ctx.seed, alone=len(tried) == 1,
+            check=ctx.goes_on, advance=share(k),
         )
         for k, name in enumerate(tried)
-    ]
+    ]  # fmt: skip
 
 
 def _requested(
@@ -193,22 +278,6 @@ def _requested(
         if path in missing:
             raise InputError(f"--free {path}: {missing[path]}")
     return [item for item in estimates if item.path in free or not item.in_set]
-
-
-class _Reporter:
-    """Progress that decides whether to go on."""
-
-    def __init__(self, progress: Progress | None) -> None:
-        self.progress = progress
-        self.fraction = 0.0
-
-    def __call__(self, fraction: float) -> None:
-        self.fraction = max(self.fraction, fraction)
-        if not self.go():
-            raise Interrupted("calibration stopped")
-
-    def go(self) -> bool:
-        return self.progress is None or self.progress(self.fraction) is not False
 
 
 def _check(logs: Sequence[Log], actuator: Actuator, structure: str | None) -> None:

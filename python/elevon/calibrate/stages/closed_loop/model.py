@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.calibrate.closed_loop.free import STICK
-from elevon.calibrate.closed_loop.log import NAMES, demand, motion, unsigned
 from elevon.calibrate.model_runs import ModelRuns
+from elevon.calibrate.stages.closed_loop.free import STICK
+from elevon.calibrate.stages.closed_loop.log import NAMES, demand, motion, unsigned
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.experiment import Experiment, Inputs, Sensor, Variant
 from elevon.logs.log import Log

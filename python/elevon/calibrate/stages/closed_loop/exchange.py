@@ -14,7 +14,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.closed_loop.fit import DECIDED, Fitted
+from elevon.calibrate.stages.closed_loop.fit import DECIDED, Fitted
 from elevon.estimate.free import outer
 from elevon.estimate.lanes import Lanes, Point
 

@@ -1,7 +1,0 @@
-"""Calibration by runs of a servo's own closed loop on recorded demands: few channels suffice."""
-
-from elevon.calibrate.closed_loop.log import loop_log
-from elevon.calibrate.closed_loop.predict import predict
-from elevon.calibrate.closed_loop.result import calibrate_loop
-
-__all__ = ["calibrate_loop", "loop_log", "predict"]
