@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from elevon.deploy import export_fmu as export_fmu
     from elevon.diagnose.door import diagnose as diagnose
     from elevon.diagnose.door import monitor as monitor
+    from elevon.diagnose.learning.door import learn as learn
     from elevon.diagnose.learning.door import learn_spread as learn_spread
     from elevon.doctor.door import doctor as doctor
     from elevon.doors import bench as bench
@@ -57,6 +58,7 @@ _PUBLIC = {
     "effects": "elevon.doors",
     "export_fmu": "elevon.deploy",
     "fleet": "elevon.prognose.door",
+    "learn": "elevon.diagnose.learning.door",
     "learn_spread": "elevon.diagnose.learning.door",
     "monitor": "elevon.diagnose.door",
     "next_test": "elevon.nexttest.door",

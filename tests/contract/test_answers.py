@@ -5,7 +5,7 @@ import re
 import pytest
 
 from elevon.cli import main
-from tests.harness.recipes import DESIGN, FLIGHT, LOG, PLAN, SCENARIO
+from tests.harness.recipes import DESIGN, FLIGHT, LABELS, LOG, PLAN, SCENARIO
 from tests.harness.registry import commands, shared_writer
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -14,6 +14,11 @@ SET = ("campaign", "run", "plan.toml", "--out", "set")
 EFFECTS = ("campaign", "run", "design.toml", "--out", "design")
 BENCH = ("bench", "run", "log.toml", *ROTARY, "--fidelity", "low", "--out")
 LOGS = ((*BENCH, "log"), (*BENCH, "base", "--seed", "3"))
+SIX = tuple(
+    (*BENCH, name, "--seed", str(k),
+     *(("--fault", "backlash@transmission=0.2 deg") if name in "bdf" else ()))
+    for k, name in enumerate("abcdef")
+)  # fmt: skip
 WATCH = ("bench", "run", "watch.toml", *ROTARY, "--fidelity", "low", "--out", "watch")
 #: Command to its words, what its first line says, commands before it, whether it takes seconds.
 ANSWERS = {
@@ -85,6 +90,9 @@ ANSWERS = {
                         r"(Inspect (now|within)|No end of life)", (), True),
     "fleet": (("history", *ROTARY, "--mission", "mission.toml"), r"visit\(s\) for 1 units", (),
               True),
+    "learn": ((*(f"{name}/log.csv" for name in "abcdef"), "--labels", "labels.csv",
+               "--out", "model.npz"), r"^learnt: 6 logs, 2 classes, \d+ .* -> model\.npz$",
+              SIX, True),
     "learn-spread": (("log/log.csv", "base/log.csv", *ROTARY, "--out", "spread.toml"),
                      r"^spread learnt: 2 days of 1 unit, 2 logs -> spread\.toml$", LOGS, True),
     "diagnose-train": (("--out", "own.npz", "--units", "8", "--low-units", "8", "--rounds", "50",
@@ -104,6 +112,7 @@ FILES = {
     "log.toml": LOG,
     "watch.toml": LOG.replace('"4 s"', '"16 s"'),
     "flight.csv": FLIGHT,
+    "labels.csv": LABELS,
 }
 
 

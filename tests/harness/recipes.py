@@ -63,6 +63,11 @@ duration = "4 s"
 command = { terms = [{ kind = "sine", amplitude = "7 deg", frequency = "0.5 Hz" }] }
 """
 
+LABELS = "log,label,unit\n" + "".join(
+    f"{name}/log.csv,{'healthy' if name in 'ace' else 'worn'},{k // 2}\n"
+    for k, name in enumerate("abcdef")
+)
+
 FLIGHT = """time [s],altitude [m],true_airspeed [m/s],angle_of_attack [deg],deflection [deg]
 0,1000,100,2,0
 1,1000,100,2,5
@@ -203,6 +208,9 @@ RECIPES = {
     "fleet": Recipe(("history", "other", *ROTARY, "--mission", "mission.toml", "--report",
                      "fleet.html", "--force"), {"history": "@history", "other": "@history"},
                     long=True, points=8, code=(0, 1)),
+    "learn": _analysis(*(f"{name}/log.csv" for name in "abcdef"), "--labels", "labels.csv", "--out",
+                       "model.npz", "--force", logs=tuple("abcdef"), files={"labels.csv": LABELS},
+                       long=True, points=4),
     "learn-spread": _analysis("log/log.csv", "base/log.csv", *ROTARY, "--out", "spread.toml",
                               "--force", logs=("log", "base"), long=True, points=4),
     "diagnose-train": Recipe(("--out", "own.npz", "--units", "8", "--low-units", "2", "--rounds",

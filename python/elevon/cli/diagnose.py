@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +15,7 @@ from elevon.errors import InputError
 from elevon.number_text import severity_texts
 
 if TYPE_CHECKING:
-    from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Cause, Diagnosis
     from elevon.prognose.append import NextEntry
 
 app = typer.Typer(rich_markup_mode=None)
@@ -30,8 +31,13 @@ def diagnose(
     column_map: common.MapOption = None,
     baseline: common.BaselineOption = None,
     method: Annotated[
-        str, typer.Option(help="model, surrogate, or both (it proposes, the model refines).")
+        str,
+        typer.Option(help="model, surrogate, both (it proposes, the model refines) or learned."),
     ] = "model",
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="For --method learned: by elevon learn, diagnose-train."),
+    ] = None,
     surrogate: Annotated[
         Path | None,
         typer.Option(help="Surrogate by elevon diagnose-train; default: the package's own."),
@@ -65,12 +71,12 @@ def diagnose(
 
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"--false-alarm {false_alarm:g}: must be between 0 and 1")
-    model = common.read_actuator(actuator, settings)
-    inspection = _inspection(append, usage, model.name, force=force)
+    unit = common.read_actuator(actuator, settings)
+    inspection = _inspection(append, usage, unit.name, force=force)
     result = run(
-        common.read_logs(logs, column_map, loadcell, command), model,
+        common.read_logs(logs, column_map, loadcell, command), unit,
         common.read_logs(baseline or [], column_map), method=method,
-        surrogate=surrogate, faults=fault, false_alarm=false_alarm, spread=spread,
+        surrogate=surrogate, faults=fault, false_alarm=false_alarm, spread=spread, model=model,
     )  # fmt: skip
     code = 0 if inspection is None else _append(inspection, result)
     return Answer(result, lambda: _print(result), code, page=result.report)
@@ -106,7 +112,7 @@ def _print(result: Diagnosis) -> None:
         (
             f"{c.kind}@{c.place}",
             f"{c.probability:.3f}",
-            *severity_texts(c.severity, c.interval, c.unit),
+            *_severity(c),
             ", ".join(folded(c)),
         )
         for c in result.faults
@@ -114,3 +120,10 @@ def _print(result: Diagnosis) -> None:
     print_table(("cause", "probability", "severity", "low", "high", "ambiguous with"), rows)
     unseen = [f"not observable: {n}: {reason}" for n, reason in by_reason(result.unobservable)]
     listed([*result.findings, sentence(result), *unseen])
+
+
+def _severity(cause: Cause) -> tuple[str, str, str]:
+    """A severity with its interval; a class that was learnt has none."""
+    if math.isnan(cause.severity):
+        return "-", "-", "-"
+    return severity_texts(cause.severity, cause.interval, cause.unit)

@@ -47,6 +47,7 @@ _HELP = {
     "monitor": "Watch a unit's stream; alarm when a fault begins.",
     "predict": "Say how long a unit will do what it must.",
     "next-inspection": "Say when to look at a unit again, and with which test.",
+    "learn": "Learn classes from labelled logs of one motion.",
     "learn-spread": "Learn from healthy logs how days and units differ.",
     "diagnose-train": "Train the surrogate that diagnose --method surrogate asks.",
     "fleet": "Group the maintenance of several units.",

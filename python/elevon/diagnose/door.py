@@ -21,12 +21,14 @@ from elevon.logs.read import as_logs
 from elevon.simulate.arguments import as_actuator
 
 if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.learning.classes import LearnedClasses
     from elevon.diagnose.surrogate import Surrogate
     from elevon.logs.log import Log
     from elevon.logs.read import LogsLike
     from elevon.simulate.arguments import ActuatorLike
 
-METHODS = ("model", "surrogate", "both")
+METHODS = ("model", "surrogate", "both", "learned")
 
 
 def diagnose(
@@ -39,6 +41,7 @@ def diagnose(
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
     spread: LearnedSpread | str | os.PathLike[str] | None = None,
+    model: LearnedClasses | str | os.PathLike[str] | None = None,
 ) -> Diagnosis:
     """Say what is wrong with the unit that wrote the logs, where, how bad, how sure.
 
@@ -51,7 +54,8 @@ def diagnose(
     baselines : Log, path, or sequence of them
         Of the healthy unit; those of the same test serve.
     method : str
-        ``model``; ``surrogate``; ``both``: the surrogate proposes, the model refines.
+        ``model``; ``surrogate``; ``both``: the surrogate proposes, the model refines; ``learned``:
+        by `elevon.learn` from labelled logs.
     surrogate : Surrogate or path, optional
         Default: the package's own.
     faults : sequence of str, optional
@@ -60,6 +64,8 @@ def diagnose(
         Rate at which a healthy unit may be called faulty.
     spread : LearnedSpread or path, optional
         By `elevon.learn_spread`; default: what the package states. Serves ``model``.
+    model : LearnedClasses or path, optional
+        By `elevon.learn`, or by ``elevon diagnose-train``. Serves ``learned``.
 
     Raises
     ------
@@ -67,16 +73,52 @@ def diagnose(
         A log that cannot be diagnosed, no candidate, a rate outside 0 to 1, a method that does not
         serve this actuator.
     """
-    model = as_actuator(actuator)
+    unit = as_actuator(actuator)
+    if method == "learned":
+        return replace(
+            _learned(logs, unit, baselines, model, faults=faults, rate=false_alarm), method=method
+        )
+    if model is not None:
+        raise InputError("--model: serves --method learned")
     run = _method(method, surrogate, spread)
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
-    if method != "model" and not turns(model):
-        raise InputError(f"--method {method}: serves turning outputs; {model.name} has none")
+    if method != "model" and not turns(unit):
+        raise InputError(f"--method {method}: serves turning outputs; {unit.name} has none")
     data, healthy = as_logs(logs), _healthy(baselines)
-    result = run(data, model, baselines=healthy, faults=faults, false_alarm=false_alarm)
-    draw = partial(traces_of, data, model, result)
-    return replace(result, actuator=model.name, method=method, draw=draw)
+    result = run(data, unit, baselines=healthy, faults=faults, false_alarm=false_alarm)
+    draw = partial(traces_of, data, unit, result)
+    return replace(result, actuator=unit.name, method=method, draw=draw)
+
+
+def _learned(
+    logs: LogsLike,
+    actuator: Actuator,
+    baselines: LogsLike,
+    model: LearnedClasses | str | os.PathLike[str] | None,
+    *,
+    faults: Sequence[str] | None,
+    rate: float,
+) -> Diagnosis:
+    """Diagnose by a file of `elevon.learn`, or by a surrogate: both are learnt, in one format."""
+    from elevon.diagnose.learning.answer import diagnose_by_classes
+    from elevon.diagnose.learning.archive import read_archive
+    from elevon.diagnose.learning.classes import KIND, LearnedClasses
+
+    if model is None:
+        raise InputError(
+            "--method learned needs --model FILE (elevon learn, elevon diagnose-train)"
+        )
+    if not isinstance(model, LearnedClasses) and read_archive(model)[0] != KIND:
+        return diagnose(
+            logs, actuator, baselines, method="surrogate", surrogate=model, faults=faults,
+            false_alarm=rate,
+        )  # fmt: skip
+    if faults or _healthy(baselines):
+        raise InputError("--method learned: classes are those of the model; no fault, no baseline")
+    classes = model if isinstance(model, LearnedClasses) else LearnedClasses.load(model)
+    result = diagnose_by_classes(as_logs(logs), classes, false_alarm=rate)
+    return replace(result, actuator=actuator.name)
 
 
 def _healthy(baselines: LogsLike) -> list[Log]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from elevon.number_text import severity_texts
@@ -81,6 +82,8 @@ def folded(cause: Cause) -> list[str]:
 
 
 def _named(cause: Cause) -> str:
+    if math.isnan(cause.severity):  # a class that was learnt
+        return _labelled(cause)
     value, low, high = severity_texts(cause.severity, cause.interval, cause.unit)
     sign = "+" if cause.severity > 0.0 else ""
     low = low.rpartition(" ")[0]
@@ -147,7 +150,15 @@ def _spoken(name: str) -> str:
     return f"{name} ({FEATURES[name].text})" if name in FEATURES else name
 
 
+def _labelled(cause: Cause) -> str:
+    """A class of labelled logs: its kind, and its place where the label has one."""
+    at = "" if cause.place == "unit" else f" at {cause.place}"
+    return f"{cause.kind.replace('_', ' ')}{at}"
+
+
 def _clause(key: str, cause: Cause) -> str:
+    if math.isnan(cause.severity):
+        return f"These are logs as those labelled {_labelled(cause)}"
     low, high = (severity_text(v, cause.unit) for v in cause.interval)
     unit = low.partition(" ")[2]
     text = (

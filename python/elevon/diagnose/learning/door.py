@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.engine.spread import LearnedSpread
+from elevon.diagnose.learning.classes import LearnedClasses
+from elevon.diagnose.learning.classify import LabelledLog, learned_classes
 from elevon.diagnose.learning.log_table import log_table, looked_up
 from elevon.diagnose.learning.spread import learned_spread
 from elevon.logs.log import Log
@@ -60,6 +62,54 @@ def learn_spread(
     rows = looked_up(log_table(units, ("unit", "day")), names_of(items), units)
     days = [(row["unit"], row["day"]) for row in rows]
     return learned_spread(data, as_actuator(actuator), days, progress)
+
+
+def learn(
+    logs: LogsLike,
+    labels: Sequence[LabelledLog] | str | os.PathLike[str],
+    *,
+    pole_pairs: float | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> LearnedClasses:
+    """Learn classes from labelled logs of one motion.
+
+    Parameters
+    ----------
+    logs : Log, path, or sequence of them
+        Of one motion that repeats.
+    labels : sequence of LabelledLog, or path
+        What is known of each, or a table (CSV) with columns ``log``, ``label``, and ``unit``,
+        ``condition`` where known. A label is ``healthy``, ``KIND@PLACE`` or a word.
+    pole_pairs : float, optional
+        Of the motor, for what turns with the electrical angle.
+    seed : int
+        Of boosting.
+    progress : callable, optional
+        Told the done fraction; returns False to stop.
+
+    Returns
+    -------
+    LearnedClasses
+        Its ``save`` writes what ``diagnose(..., method="learned", model=)`` takes.
+
+    Raises
+    ------
+    InputError, FormatError
+        Logs of several motions, too few of a class, none that is healthy; a table that does not
+        name each log once.
+    Interrupted
+        `progress` returned False.
+    """
+    items = listed(logs)
+    known = labelled(labels, names_of(items)) if isinstance(labels, (str, os.PathLike)) else labels
+    return learned_classes(read(items), known, pole_pairs=pole_pairs, seed=seed, progress=progress)
+
+
+def labelled(table: str | os.PathLike[str], logs: Sequence[str | Path]) -> list[LabelledLog]:
+    """Return what a table says of logs; errors as `looked_up`."""
+    rows = looked_up(log_table(table, ("label",), ("unit", "condition")), logs, table)
+    return [LabelledLog(r["label"], r.get("unit", ""), r.get("condition", "")) for r in rows]
 
 
 def listed(logs: LogsLike) -> list[Log | str | os.PathLike[str]]:

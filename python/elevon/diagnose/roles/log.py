@@ -46,10 +46,32 @@ def role_log(log: Log, actuator: Actuator, *, until: float | None = None) -> Rol
     InputError
         No command, nothing commanded, nothing recorded, too short, or nothing moves.
     """
+    ready, seconds, findings = aligned(log, sequence=bool(_actions(actuator.wiring)), until=until)
+    return _reading(log, ready, actuator, seconds=seconds, findings=findings)
+
+
+def aligned(
+    log: Log, *, sequence: bool, until: float | None = None
+) -> tuple[Log, float, list[str]]:
+    """Return a log on an even clock counted from its onset, seconds after it, and findings.
+
+    Parameters
+    ----------
+    log : Log
+        By roles, one of them ``command``.
+    sequence : bool
+        Whether the command is a number of actions, not a position.
+    until : float, optional
+        Instant of the log up to which it is read [s].
+
+    Raises
+    ------
+    InputError
+        As `role_log`.
+    """
     log, lost = complete(log)
     time, name = log.time, log.name
-    actions = _actions(actuator.wiring)
-    first = _onset(time, log["command"], sequence=bool(actions), name=name)
+    first = _onset(time, log["command"], sequence=sequence, name=name)
     rate = 1.0 / float(np.median(np.diff(time)))
     seconds = _length(float(time[-1] - time[0]), float(time[-1] - first))
     if until is not None:
@@ -61,11 +83,9 @@ def role_log(log: Log, actuator: Actuator, *, until: float | None = None) -> Rol
     findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
     if until is None and time[-1] - first > _LONGEST * (1.0 + _LADDER):
         findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
-    ready = replace(
-        log, time=clock, channels=channels, good=np.ones(len(clock), dtype=np.bool_),
-        recording=None,
-    )  # fmt: skip
-    return _reading(log, ready, actuator, rate=rate, seconds=seconds, findings=findings)
+    good = np.ones(len(clock), dtype=np.bool_)
+    ready = replace(log, time=clock, channels=channels, good=good, recording=None)
+    return ready, seconds, findings
 
 
 def complete(log: Log) -> tuple[Log, list[str]]:
@@ -168,7 +188,6 @@ def _reading(
     log: Log,
     actuator: Actuator,
     *,
-    rate: float,
     seconds: float,
     findings: Sequence[str],
 ) -> RoleReading:
@@ -190,7 +209,7 @@ def _reading(
     return RoleReading(
         log,
         ready,
-        rate,
+        1.0 / float(log.time[1] - log.time[0]),
         seconds,
         _command_of(log.time, log["command"], sequence=bool(actions)),
         actions,

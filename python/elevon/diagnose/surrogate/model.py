@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import json
 import os
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.diagnose.learning.archive import read_archive, write_archive
 from elevon.diagnose.surrogate.features import NAMES, SurrogateFeatures
 from elevon.diagnose.surrogate.network import Ensemble, Opinion, either, honest
 from elevon.diagnose.surrogate.pack import packed, unpacked
@@ -23,8 +21,7 @@ from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.view import VIEWS, View
 from elevon.errors import FormatError
 
-_FORMAT, _VERSION = "elevon-surrogate", 2
-_MOST_BYTES = 50_000_000
+KIND = "surrogate"
 _TEST = 0.2  # relative difference of travel and speed up to which a log is of a test
 _STORED = (
     "scaling", "conformal", "healthy", "fold", "known", "low", "high", "unit_low", "unit_high",
@@ -214,10 +211,8 @@ class Surrogate:
         Raises
         ------
         OutputExistsError, OutputError
-            As `elevon.files.write_bytes`.
+            As `elevon.diagnose.learning.archive.write_archive`.
         """
-        from elevon.files import write_bytes
-
         arrays: dict[str, npt.NDArray[Any]] = {}
         tests: dict[str, Any] = {}
         for name, test in self.tests.items():
@@ -228,13 +223,10 @@ class Surrogate:
                 arrays |= {f"{key}.{n}": a for n, a in _arrays(head).items()}
         values, index = packed(arrays)
         about = {
-            "format": _FORMAT, "version": _VERSION, "names": list(NAMES), "faults": list(FAULTS),
-            "tests": tests, "arrays": index, "report": dict(self.report),
+            "names": list(NAMES), "faults": list(FAULTS), "tests": tests, "arrays": index,
+            "report": dict(self.report),
         }  # fmt: skip
-        stream = io.BytesIO()
-        text = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
-        np.savez(stream, about=text, **values)  # type: ignore[arg-type]
-        return write_bytes(path, stream.getvalue(), force=force)
+        return write_archive(path, KIND, about, values, force=force)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Surrogate:
@@ -245,22 +237,16 @@ class Surrogate:
         FormatError
             The file is absent, damaged, of another version or something else.
         """
+        kind, about, data = read_archive(path)
+        if kind != KIND:
+            raise FormatError(f"{path}: holds {kind}, not a surrogate")
         try:
-            if not Path(path).is_file():
-                raise ValueError("is no regular file")
-            with zipfile.ZipFile(path) as archive:
-                if sum(item.file_size for item in archive.infolist()) > _MOST_BYTES:
-                    raise ValueError(f"more than {_MOST_BYTES} bytes")
-            with np.load(path, allow_pickle=False) as stored:
-                return _assembled({name: stored[name] for name in stored.files})
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            return _assembled(about, data)
+        except (ValueError, KeyError, TypeError) as error:
             raise FormatError(f"{path}: not a surrogate of this version: {error}") from error
 
 
-def _assembled(data: Mapping[str, Any]) -> Surrogate:
-    about = json.loads(bytes(data["about"]))
-    if about.get("format") != _FORMAT or about.get("version") != _VERSION:
-        raise ValueError(f"format {about.get('format')!r}, version {about.get('version')!r}")
+def _assembled(about: Mapping[str, Any], data: Mapping[str, Any]) -> Surrogate:
     if tuple(about["names"]) != NAMES or tuple(about["faults"]) != FAULTS:
         raise ValueError("features or faults of another version; train it anew")
     arrays = unpacked(data, about["arrays"])
