@@ -21,7 +21,7 @@ from elevon.errors import FormatError, InputError
 
 KIND = "classes"
 HEALTHY = "healthy"
-_OWN = {f.name for f in fields(Discriminant)} - {"classes"}
+_FIELDS = {f.name for f in fields(Discriminant)} - {"classes"}
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,8 @@ class LearnedClasses:
 
     def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
         """Write arrays and a JSON text; as `elevon.diagnose.learning.archive.write_archive`."""
-        own = {name: np.asarray(getattr(self.discriminant, name)) for name in sorted(_OWN)}
-        arrays = {f"discriminant.{name}": value for name, value in own.items()}
+        stored = {name: np.asarray(getattr(self.discriminant, name)) for name in sorted(_FIELDS)}
+        arrays = {f"discriminant.{name}": value for name, value in stored.items()}
         arrays |= {name: getattr(self, name) for name in ("healthy", "distances", "command")}
         if self.trees is not None:
             arrays |= {f"trees.{name}": value for name, value in self.trees.arrays().items()}
@@ -165,15 +165,15 @@ def _assembled(about: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]])
     real = {n: np.asarray(a, dtype=np.float64) for n, a in arrays.items()}
     if not all(np.isfinite(a).all() for a in real.values()):
         raise ValueError("an array is not finite")
-    own = {n: real[f"discriminant.{n}"] for n in _OWN}
-    scalars = {n: float(own.pop(n)) for n in ("shrinkage", "temperature")}
+    stored = {n: real[f"discriminant.{n}"] for n in _FIELDS}
+    scalars = {n: float(stored.pop(n)) for n in ("shrinkage", "temperature")}
     classes = tuple(str(name) for name in about["classes"])
     count, wide = len(classes), len(about["features"])
-    if own["means"].shape != (count, wide) or own["precision"].shape != (wide, wide):
+    if stored["means"].shape != (count, wide) or stored["precision"].shape != (wide, wide):
         raise ValueError("classes and features are not those of the arrays")
     trees = {n.removeprefix("trees."): a for n, a in arrays.items() if n.startswith("trees.")}
     return LearnedClasses(
-        tuple(map(str, about["features"])), Discriminant(classes, **own, **scalars),
+        tuple(map(str, about["features"])), Discriminant(classes, **stored, **scalars),
         Trees.build(trees) if trees else None, float(about["temperature"]),
         real["healthy"], real["distances"], real["command"], float(about["pace"]),
         float(about["seconds"]),
