@@ -11,7 +11,7 @@ from elevon.diagnose.by_model import check_request
 from elevon.diagnose.engine.answer import Cause, Diagnosis, Moved, Reason
 from elevon.diagnose.engine.spread import needed
 from elevon.diagnose.learning.classes import HEALTHY, ClassOpinion, LearnedClasses
-from elevon.diagnose.learning.motion import Motion, motion_of
+from elevon.diagnose.learning.motion import LoggedMotion, motion_of
 
 if TYPE_CHECKING:
     from elevon.logs.log import Log
@@ -89,7 +89,7 @@ def _causes(says: ClassOpinion) -> list[Cause]:
     return sorted(out, key=lambda cause: -cause.probability)
 
 
-def _moved(items: Sequence[Motion], learned: LearnedClasses) -> tuple[Moved, ...]:
+def _moved(items: Sequence[LoggedMotion], learned: LearnedClasses) -> tuple[Moved, ...]:
     """The numbers that stand furthest from the healthy class, in its scatter."""
     fit = learned.discriminant
     mean = fit.means[fit.classes.index(HEALTHY)] * fit.scale

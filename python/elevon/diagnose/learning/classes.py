@@ -14,7 +14,7 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.diagnose.engine.spread import needed
 from elevon.diagnose.learning.archive import read_archive, write_archive
-from elevon.diagnose.learning.motion import Motion
+from elevon.diagnose.learning.motion import LoggedMotion
 from elevon.diagnose.learning.trees import Trees
 from elevon.diagnose.modelfree.discriminant import Discriminant
 from elevon.errors import FormatError, InputError
@@ -62,7 +62,7 @@ class LearnedClasses:
     distances : ndarray, shape (n,)
         Of all logs to the nearest class, their group held out.
     command : ndarray, shape (200,)
-        Of the motion, as `Motion` has it.
+        Of the motion, as `LoggedMotion` has it.
     pace, seconds : float
         Of it.
     pole_pairs : float or None
@@ -88,7 +88,7 @@ class LearnedClasses:
         """Names, as labelled."""
         return self.discriminant.classes
 
-    def values(self, motions: Sequence[Motion]) -> Floats:
+    def values(self, motions: Sequence[LoggedMotion]) -> Floats:
         """Return the numbers of logs, shape (n, k).
 
         Raises
@@ -107,7 +107,7 @@ class LearnedClasses:
                 )
         return np.array([[item.values[name] for name in self.features] for item in motions])
 
-    def says(self, motions: Sequence[Motion]) -> ClassOpinion:
+    def says(self, motions: Sequence[LoggedMotion]) -> ClassOpinion:
         """Return what it says of logs of one unit in one condition, taken as independent."""
         values = self.values(motions)
         scores = scores_of(self.discriminant, self.trees, values) / self.temperature

@@ -31,7 +31,7 @@ _SOONER = 0.3  # of its length that a log may be shorter or longer: benches are 
 
 
 @dataclass(frozen=True)
-class Motion:
+class LoggedMotion:
     """One log of it.
 
     Attributes
@@ -67,7 +67,7 @@ class Motion:
         return ""
 
 
-def motion_of(log: Log, pole_pairs: float | None = None) -> Motion:
+def motion_of(log: Log, pole_pairs: float | None = None) -> LoggedMotion:
     """Compute the numbers of a log from the onset of its command.
 
     Parameters
@@ -100,10 +100,10 @@ def motion_of(log: Log, pole_pairs: float | None = None) -> Motion:
     slow = group_means(command, max(1, round(_SLOW / (ready.time[1] - ready.time[0]))))
     pace = float(np.std(np.diff(slow)) / _SLOW / np.std(command))
     quantiles = np.quantile(command, np.linspace(0.0, 1.0, _POINTS)) - command.mean()
-    return Motion(log.name, values, quantiles, pace, seconds)
+    return LoggedMotion(log.name, values, quantiles, pace, seconds)
 
 
-def motions(logs: Sequence[Log], pole_pairs: float | None = None) -> tuple[Motion, ...]:
+def motions(logs: Sequence[Log], pole_pairs: float | None = None) -> tuple[LoggedMotion, ...]:
     """Compute the numbers of logs that must be of one motion.
 
     Raises
