@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.report import Report, ReportTable
+from elevon.report.figures import COLOURS, new_figure
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +46,11 @@ def effects_report(effects: Effects, folder: str, *, date: str | None = None) ->
         section.text(text)
     section.figure(pareto(effects), "Pareto chart; the line is the margin of the interval.")
     section.figure(half_normal(effects), "Half-normal plot; effects of noise alone lie on a line.")
-    factors = [[f["letter"], f["name"], f["low"], f["high"], f["unit"]] for f in effects.factors]
+    factors = []
+    for item in effects.factors:
+        unit = display_unit(item["unit"])
+        ends = [to_display(item[name], unit) for name in ("low", "high")]
+        factors.append([item["letter"], item["name"], *ends, unit])
     report.section("Factors").table(
         ReportTable(["Letter", "Factor", "Low", "High", "Unit"], factors)
     )
@@ -84,35 +90,31 @@ def _confounded(effects: Effects) -> list[str]:
 
 def pareto(effects: Effects, most: int = 25) -> Figure:
     """Return the Pareto chart of the largest effects."""
-    from matplotlib.figure import Figure
-
     terms = effects.terms[:most][::-1]
-    figure = Figure(figsize=(6.4, 0.8 + 0.26 * len(terms)), layout="constrained")
-    axes = figure.subplots()
-    colours = ["#1f4e79" if term.significant else "#9db4c8" for term in terms]
-    axes.barh([term.term for term in terms], [abs(term.effect) for term in terms], color=colours)
-    if effects.margin is not None:
-        axes.axvline(effects.margin, color="#b03a2e", linestyle="--")
-    axes.set_xlabel(f"magnitude of the effect on {effects.response} [{effects.unit}]")
+    colours = [COLOURS["blue" if term.significant else "grey"] for term in terms]
+    sizes = [abs(term.effect) for term in terms]
+    with new_figure(height=0.8 + 0.26 * len(terms)) as (figure, axes):
+        axes.barh([term.term for term in terms], sizes, color=colours)
+        if effects.margin is not None:
+            axes.axvline(effects.margin, color=COLOURS["red"], linestyle="--")
+        axes.set_xlabel(f"magnitude of the effect on {effects.response} [{effects.unit}]")
     return figure
 
 
 def half_normal(effects: Effects) -> Figure:
     """Return the half-normal plot."""
-    from matplotlib.figure import Figure
     from scipy.stats import norm
 
     terms = sorted(effects.terms, key=lambda term: abs(term.effect))
     quantiles = norm.ppf(0.5 + 0.5 * (np.arange(len(terms)) + 0.5) / len(terms))
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    axes = figure.subplots()
     sizes = [abs(term.effect) for term in terms]
-    axes.plot(sizes, quantiles, "o", color="#1f4e79", markersize=4)
-    for term, size, quantile in list(zip(terms, sizes, quantiles, strict=True))[-8:]:
-        axes.annotate(term.term, (size, quantile), xytext=(4, 2), textcoords="offset points")
-    if effects.error is not None:
-        top = float(quantiles[-1])
-        axes.plot([0.0, effects.error * top], [0.0, top], color="#b03a2e", linestyle="--")
-    axes.set_xlabel(f"magnitude of the effect on {effects.response} [{effects.unit}]")
-    axes.set_ylabel("half-normal quantile")
+    with new_figure(height=4.2) as (figure, axes):
+        axes.plot(sizes, quantiles, "o", color=COLOURS["blue"], markersize=4)
+        for term, size, quantile in list(zip(terms, sizes, quantiles, strict=True))[-8:]:
+            axes.annotate(term.term, (size, quantile), xytext=(4, 2), textcoords="offset points")
+        if effects.error is not None:
+            top = float(quantiles[-1])
+            axes.plot([0.0, effects.error * top], [0.0, top], color=COLOURS["red"], linestyle="--")
+        axes.set_xlabel(f"magnitude of the effect on {effects.response} [{effects.unit}]")
+        axes.set_ylabel("half-normal quantile")
     return figure

@@ -48,6 +48,9 @@ def calibration_report(
     facts = result.facts
     names = ", ".join(log.name for log in result.logs)
     report = Report(f"Calibration of {result.name}", f"From {names}. {_scale(facts)}", date=date)
+    found, missing = sum(i.in_set for i in result.estimates), len(result.undetermined)
+    text = f"{found} parameters determined" + (f", {missing} not" if missing else "")
+    report.judge(text, "open" if missing or not found else "pass")
     report.fact("Parameters estimated", str(sum(i.in_set for i in result.estimates)))
     explained = facts.get("explained", {})
     for name, text, of in (
@@ -105,6 +108,8 @@ def validation_report(result: Validation, *, date: str | None = None) -> Report:
     ]
     if checks:
         report.section("Thresholds of the actuator file").checks(checks)
+    else:
+        report.judge("Measured: the actuator file has no thresholds", "open")
     report.provenance(_provenance())
     return report
 

@@ -39,6 +39,12 @@ class SignalPanel:
     healthy: Floats
     named: Floats | None
 
+    @property
+    def apart(self) -> float:
+        """How far the log is from the healthy model, over that signal's own spread."""
+        off = float(np.sqrt(np.nanmean((self.log - self.healthy) ** 2)))
+        return off / (float(np.nanstd(self.healthy)) or 1.0)
+
 
 @dataclass(frozen=True)
 class Traces:
@@ -68,12 +74,16 @@ def traces_figure(traces: Traces) -> Figure:
     count = len(traces.panels)
     size = {"width": 9.0, "height": 0.6 + 1.9 * count}
     with new_figure(count, 1, sharex=True, squeeze=False, **size) as (figure, grid):
-        for axis, panel in zip(grid[:, 0], traces.panels, strict=True):
-            lines = [("grey", "healthy model", panel.healthy), ("blue", "log", panel.log)]
+        panels = sorted(traces.panels, key=lambda item: -item.apart)
+        for axis, panel in zip(grid[:, 0], panels, strict=True):
+            # The wide ones first: none hides another where they agree.
+            lines = [("grey", "healthy model", 4.5, panel.healthy)]
             if panel.named is not None:
-                lines.append(("orange", "model with what is named", panel.named))
-            for colour, label, values in lines:
-                axis.plot(*_means(traces.time, values), color=COLOURS[colour], lw=1.1, label=label)
+                lines.append(("orange", "model with what is named", 3.0, panel.named))
+            lines.append(("blue", "log", 1.0, panel.log))
+            for colour, label, width, values in lines:
+                line = _means(traces.time, values)
+                axis.plot(*line, color=COLOURS[colour], lw=width, label=label)
             axis.set(ylabel=f"[{panel.unit}]", title=panel.name)
             axis.margins(x=0.0)
         grid[0, 0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)

@@ -83,6 +83,8 @@ def survival_figure(result: Prognosis) -> Figure:
         axis.set(
             xlabel=f"next N {result.unit}", ylabel="probability of surviving", ylim=(0.0, 1.03)
         )
+        if finite.any():  # the few futures that go on for long would press the others together
+            axis.set_xlim(0.0, 1.15 * float(np.quantile(ranked[finite], 0.98)))
         for value, style in ((result.median, "-"), *((v, ":") for v in result.interval)):
             if np.isfinite(value):
                 axis.axvline(value, color=COLOURS["grey"], ls=style, lw=0.9)

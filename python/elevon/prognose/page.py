@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -55,6 +55,7 @@ def prognosis_page(
     """Return the report of a prognosis."""
     name = f"{actuator} {result.serial or ''}".strip()
     report = Report(f"Remaining life of {name}", sentence(result), date=date)
+    report.judge(*_badge(result))
     future = report.section("What is to come")
     future.figure(
         course_figure(result, inspections, laws),
@@ -74,6 +75,17 @@ def prognosis_page(
     _assumed(report, assumed, result.unit)
     _laws(report, laws)
     return report
+
+
+def _badge(result: Prognosis) -> tuple[str, Literal["pass", "fail", "open"]]:
+    """Return the verdict in a few words."""
+    if result.off_law:
+        return "The history contradicts the law", "open"
+    if not np.isfinite(result.median):
+        return "No end in sight", "pass"
+    if result.median <= 0.0:
+        return "Life has ended", "fail"
+    return f"{result.median:.3g} {result.unit} remain", "open"
 
 
 def _assumed(report: Report, assumed: Sequence[Assumed], unit: str) -> None:

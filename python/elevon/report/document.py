@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from html import unescape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from elevon.files import visible, write_text
 from elevon.report.checks import Check, all_passed
@@ -103,6 +103,11 @@ class Section:
         self.items += [{"kind": "text", "text": paragraph} for paragraph in paragraphs]
         return self
 
+    def heading(self, text: str) -> Section:
+        """Add a heading below the section's own."""
+        self.items.append({"kind": "heading", "text": text})
+        return self
+
     def points(self, points: Sequence[str]) -> Section:
         """Add a list of points."""
         self.items.append({"kind": "points", "points": list(points)})
@@ -124,7 +129,7 @@ class Section:
         return self
 
     def figure(self, figure: Figure, caption: str) -> Section:
-        """Add a matplotlib figure as an inline drawing that follows the page's colours.
+        """Add a matplotlib figure: charts to zoom in and to read, an inline drawing on paper.
 
         Parameters
         ----------
@@ -133,12 +138,11 @@ class Section:
         caption : str
             What it shows; also read out in place of the picture.
         """
-        from elevon.report.figures import inline_svg
+        from elevon.report.figures import figure_markup
 
         name = f"{self.number}-{len(self.items)}"
-        self.items.append(
-            {"kind": "figure", "svg": inline_svg(figure, name, caption), "caption": caption}
-        )
+        markup, live = figure_markup(figure, name, caption)
+        self.items.append({"kind": "chart" if live else "figure", "markup": markup})
         return self
 
     def chart(
@@ -193,9 +197,14 @@ class Report:
         self.date = date
         self.sections: list[Section] = []
         self.facts: list[tuple[str, str, str]] = []
-        self.opening: tuple[Markup, str] | None = None
+        self.opening: tuple[Markup | str, bool] = ("", False)
         self.beside: dict[str, str] = {}
+        self.verdict: tuple[str, str] | None = None
         self._provenance: dict[str, str] = {}
+
+    def judge(self, text: str, kind: Literal["pass", "fail", "open"]) -> None:
+        """Set the verdict, one or two words in a badge under the title; ``open``: not decided."""
+        self.verdict = (text, kind)
 
     def section(self, title: str, *paragraphs: str) -> Section:
         """Start a section, with its first paragraphs."""
@@ -209,9 +218,9 @@ class Report:
 
     def open_with(self, figure: Figure, caption: str) -> None:
         """Put one picture under the lead, before everything else."""
-        from elevon.report.figures import inline_svg
+        from elevon.report.figures import figure_markup
 
-        self.opening = (inline_svg(figure, "opening", caption), caption)
+        self.opening = figure_markup(figure, "opening", caption)
 
     def provenance(self, entries: Mapping[str, object]) -> None:
         """Add what is needed to make the report again: version, hashes, seed, command."""
@@ -259,7 +268,8 @@ class Report:
 
     def _assets(self) -> str:
         """Script and style of interactive charts, only when there are any."""
-        if not any(item["kind"] == "chart" for part in self.sections for item in part.items):
+        items = [item for part in self.sections for item in part.items]
+        if not any(item["kind"] == "chart" for item in items) and not self.opening[1]:
             return ""
         from elevon.report.uplot import assets
 

@@ -126,6 +126,31 @@ def inline_svg(figure: Figure, name: str, description: str) -> Markup:
     return Markup(body.replace("<svg", label, 1))  # noqa: S704
 
 
+def figure_markup(figure: Figure, name: str, caption: str) -> tuple[Markup, bool]:
+    """Return a figure with its caption for a page, and whether it has charts.
+
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    name : str
+        Unique in its page.
+    caption : str
+        What it shows; also read out in place of the drawing.
+    """
+    from markupsafe import Markup
+
+    from elevon.report.panels import columns_of, panels_of
+    from elevon.report.uplot import figure as live
+
+    svg = inline_svg(figure, name, caption)
+    panels = panels_of(figure, _INK)
+    if panels is None:
+        return Markup("<figure>{}<figcaption>{}</figcaption></figure>").format(svg, caption), False
+    # Safe: the drawing is, the caption is escaped there, the data are base64 and escaped JSON.
+    return Markup(live(svg, panels, columns_of(figure), caption)), True  # noqa: S704
+
+
 def save_figure(
     figure: Figure, path: str | os.PathLike[str], *, force: bool = False, dpi: int = 150
 ) -> Path:
@@ -146,6 +171,7 @@ def save_figure(
         stream = io.BytesIO()
         with _style():
             _repaint_rules(figure)
+            _legends_aside(figure)
             figure.savefig(
                 stream, format=target.suffix.lower().lstrip("."), dpi=dpi, facecolor="white"
             )
@@ -162,8 +188,22 @@ def on_white(drawing: str) -> str:
     )
 
 
+def _legends_aside(figure: Figure) -> None:
+    """Put legends that would lie over the curves above them, or beside where a title stands."""
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        # Whoever gave a place outside has chosen; there is no public way to ask.
+        if legend is None or legend._bbox_to_anchor is not None:  # type: ignore[attr-defined]
+            continue
+        beside = bool(axes.get_title("left") or axes.get_title())
+        legend.set_loc("upper left" if beside else "lower right")
+        legend.set_bbox_to_anchor((1.0, 1.0), transform=axes.transAxes)
+        legend.set_ncols(1 if beside else min(4, len(legend.get_texts())))
+
+
 def _svg_text(figure: Figure, name: str, **options: Any) -> str:
     stream = io.StringIO()
+    _legends_aside(figure)
     with _style(**{"svg.hashsalt": name, "svg.id": None}):
         figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None}, **options)
     return stream.getvalue()

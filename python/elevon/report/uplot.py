@@ -5,17 +5,19 @@ base64 inside the page: times as float64, values as float32, thinned to the extr
 slices when they are many, so that no peak is lost.
 """
 
-import base64
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.report.fixed import drawing
+from elevon.report.panels import packed, with_times_once
 from elevon.report.policy import policy
 
 COLOURS = ("#2f7fd1", "#e0782f", "#2f9e6e", "#d1483c", "#8a6fd0", "#8a929d", "#b8860b", "#0f8b8d")
@@ -100,29 +102,70 @@ def chart(
         note += (
             f"{instants.size} samples drawn as the extremes of {selected.size // 2} time slices."
         )
-    spec = {
-        "x": x_label,
-        "y": y_label,
-        "height": int(height),
-        "shaded": [list(item) for item in shaded],
-        "log": bool(logarithmic),
-        "time": _base64(selected),
-        "series": [
-            {
-                "name": name,
-                "colour": COLOURS[k % len(COLOURS)],
-                "dash": [6, 4] if name in dashed else [],
-                "values": _base64(_float32(line)),
-            }
-            for k, (name, line) in enumerate(drawn.items())
-        ],
-    }
-    data = json.dumps(spec).replace("<", "\\u003c")
-    caption = f'<p class="note">{escape(note)}</p>' if note else ""
-    return (
-        f'<section class="elevon-chart"><h3>{escape(title)}</h3><div class="plot"></div>{caption}'
-        f'<script type="application/json">{data}</script></section>'
+    series = with_times_once([
+        _line(name, line, selected, COLOURS[k % len(COLOURS)], dashed=name in dashed)
+        for k, (name, line) in enumerate(drawn.items())
+    ])  # fmt: skip
+    panel = {
+        "title": "", "label": [x_label, y_label], "log": [bool(logarithmic)] * 2, "limits": None,
+        "ticks": [None, None], "height": int(height), "series": series,
+        "shapes": [_stretch(k, item) for k, item in enumerate(shaded)],
+    }  # fmt: skip
+    fixed = drawing(
+        instants, values, COLOURS, labels=(x_label, y_label), height=height,
+        logarithmic=logarithmic, dashed=dashed, shaded=shaded,
+    )  # fmt: skip
+    heading = f"<h3>{escape(title)}</h3>{fixed}"
+    return _element(
+        "section", heading, [panel], 1, f'<p class="note">{escape(note)}</p>' * bool(note)
     )
+
+
+def figure(svg: str, panels: Sequence[Mapping[str, Any]], columns: int, caption: str) -> str:
+    """Return a figure whose drawing gives way to charts of the same data where scripts run.
+
+    Parameters
+    ----------
+    svg : str
+        The drawing, an SVG element.
+    panels : sequence of dict
+        As `elevon.report.panels.panels_of` returns them.
+    columns : int
+        Panels side by side where the page is wide enough.
+    caption : str
+        Under it; escaped.
+    """
+    return _element("figure", svg, panels, columns, f"<figcaption>{escape(caption)}</figcaption>")
+
+
+def _element(
+    tag: str, before: str, panels: Sequence[Mapping[str, Any]], columns: int, after: str
+) -> str:
+    data = json.dumps({"columns": columns, "panels": panels}, allow_nan=False)
+    data = data.replace("<", "\\u003c")
+    return (
+        f'<{tag} class="elevon-chart">{before}<div class="panels"></div>'
+        f'<script type="application/json">{data}</script>{after}</{tag}>'
+    )
+
+
+def _line(name: str, line: Floats, time: Floats, colour: str, *, dashed: bool) -> dict[str, Any]:
+    return {
+        "name": name, "colour": colour, "dash": [6, 4] if dashed else None, "width": 1.4,
+        "alpha": 1.0, "marker": "", "step": 0,
+        "time": packed(time, "<f8"), "values": packed(line),
+    }  # fmt: skip
+
+
+def _stretch(k: int, item: tuple[float, float, str, bool]) -> dict[str, Any]:
+    start, end, text, alarming = item
+    colour = "#d1483c" if alarming else "#808894"
+    alpha = 0.12 if alarming or k % 2 == 0 else 0.05
+    return {
+        "kind": "box", "name": "", "colour": colour, "alpha": alpha,
+        "x": [float(start), float(end)], "y": None, "text": text, "row": k,
+        "ink": "#c0392b" if alarming else "",
+    }  # fmt: skip
 
 
 def page(title: str, body: str) -> str:
@@ -138,7 +181,7 @@ def page(title: str, body: str) -> str:
     look = (
         ":root { color-scheme: light dark; } body { margin: 1.5rem auto; max-width: 75rem; "
         "padding: 0 1rem; background: Canvas; color: CanvasText; } "
-        "h1 { font: 600 1.3rem system-ui, sans-serif; }"
+        "h1 { font: 600 1.3rem system-ui, sans-serif; } svg { width: 100%; height: auto; }"
     )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -201,13 +244,3 @@ def _interrupted(
     holes = (time[after] + time[after + 1]) / 2
     lines = {name: np.insert(line, after + 1, np.nan) for name, line in values.items()}
     return np.insert(time, after + 1, holes), lines
-
-
-def _float32(line: Floats) -> npt.NDArray[np.float32]:
-    with np.errstate(over="ignore"):  # beyond float32 is drawn as missing
-        return line.astype(np.float32)
-
-
-def _base64(array: npt.NDArray[np.float64] | npt.NDArray[np.float32]) -> str:
-    kind = "<f4" if array.dtype == np.float32 else "<f8"
-    return base64.b64encode(array.astype(kind).tobytes()).decode("ascii")

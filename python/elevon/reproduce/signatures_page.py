@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.report import Report, ReportTable
-from elevon.report.figures import new_figure
+from elevon.report.figures import COLOURS, new_figure
 from elevon.units import display_unit, format_quantity, to_display
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def signatures_page(result: SignaturesResult, date: str | None = None) -> Report
             "the brighter, the plainer.",
         )
         for item in mine:
+            section.heading(f"{item.kind}@{item.place}")
             section.figure(_pair(item), _caption(item))
     section = report.section("All of them")
     section.checks(result.checks)
@@ -43,9 +44,10 @@ def signatures_page(result: SignaturesResult, date: str | None = None) -> Report
 
 
 def _caption(item: Signature) -> str:
-    severity = format_quantity(item.severity, display_unit(item.unit), 3)
+    unit = "%" if item.unit == "1" else display_unit(item.unit)
+    severity = format_quantity(item.severity, unit, 3)
     others = f"; also at {', '.join(item.places[1:])}" if len(item.places) > 1 else ""
-    return f"{item.kind}@{item.place} = {severity}: {item.effect}{others}. Run: {item.status}."
+    return f"{severity}: {item.effect}{others}. Run: {item.status}."
 
 
 def _map(items: list[Signature]) -> Figure:
@@ -68,17 +70,20 @@ def _pair(item: Signature) -> Figure:
     if item.signal.endswith("_position"):
         linear = item.actuator != "torino-rotary"
         unit, scale = ("mm", 1e3) if linear else ("deg", float(np.rad2deg(1.0)))
+    # The healthy one is wide and lies below: it is seen where both agree, and where they do not.
+    looks = {"healthy": {"color": COLOURS["grey"], "lw": 3.0},
+             "faulty": {"color": COLOURS["orange"], "lw": 0.9}}  # fmt: skip
     lines = {"healthy": scale * item.healthy, "faulty": scale * item.faulty}
     step = max(item.time.size // 1500, 1)
     with new_figure(1, 2, height=2.3, width_ratios=[3, 2]) as (figure, axes):
         for name, values in lines.items():
-            axes[0].plot(item.time[::step], values[::step], lw=1.0, label=name)
+            axes[0].plot(item.time[::step], values[::step], label=name, **looks[name])
         for panel in spectra([Panel(item.signal, unit, item.time, lines)]):
             low = panel.time < 0.45 / (item.time[1] - item.time[0])
             for name, values in panel.lines.items():
                 slices = np.unique(np.geomspace(1, low.sum() - 1, 300).astype(int))
-                axes[1].loglog(panel.time[slices], values[slices] + 1e-12, lw=0.9, label=name)
+                axes[1].loglog(panel.time[slices], values[slices] + 1e-12, **looks[name])
         axes[0].set(xlabel="time [s]", ylabel=f"{item.signal} [{unit}]")
         axes[1].set(xlabel="frequency [Hz]", ylabel=f"[{unit}]")
-        axes[0].legend(loc="best", fontsize=7)
+        figure.legend(loc="outside upper right", ncols=2, fontsize=8)
     return figure

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from elevon.diagnose.engine.words import by_reason, sentence, severity_text
+from elevon.diagnose.engine.words import UNEXPLAINED, by_reason, sentence, severity_text
 from elevon.diagnose.pictures import features_figure, traces_figure
 from elevon.report import Report, ReportTable
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis, Moved
     from elevon.diagnose.pictures import Traces
 
 _DRAWN = 4  # logs
@@ -35,8 +36,10 @@ def diagnosis_page(
         Of the logs; the first four are drawn.
     """
     report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
+    report.judge(*_badge(result))
     _causes(report, result)
-    _signals(report, traces[:_DRAWN])
+    decided = _deciding(result)
+    _signals(report, traces, decided)
     _features(report, result)
     if result.alternatives:
         _alternatives(report, result)
@@ -111,10 +114,43 @@ def _alternatives(report: Report, result: Diagnosis) -> None:
     )
 
 
-def _signals(report: Report, traces: Sequence[Traces]) -> None:
-    if not traces:
+def _badge(result: Diagnosis) -> tuple[str, Literal["pass", "fail", "open"]]:
+    """Return the verdict in a word or two; a healthy unit with a residual is not decided."""
+    left = any(UNEXPLAINED in text for text in result.findings)
+    if result.status == "healthy":
+        return ("Not decided", "open") if left else ("Healthy", "pass")
+    if result.status == "faulty":
+        return f"Faulty: {' and '.join(result.best)}", "fail"
+    return ("Unknown fault", "fail") if result.alarm else ("Model does not fit", "open")
+
+
+def _deciding(result: Diagnosis) -> Moved | None:
+    """Return the feature that decided it: named with the reason, else the one furthest off."""
+    name = "" if result.reason is None else result.reason.feature
+    of = [m for m in result.features if m.name == name] or result.features
+    return max(of, key=lambda m: abs(m.score) if math.isfinite(m.score) else 0.0, default=None)
+
+
+def _displayed(value: float, unit: str) -> tuple[float, str]:
+    """Return a value in the unit of the terminal; differences of temperature stay in K."""
+    name = unit if unit == "K" else display_unit(unit)
+    return float(to_display(value, name)), name
+
+
+def _signals(report: Report, given: Sequence[Traces], decided: Moved | None) -> None:
+    """Draw the log that decided it first, and of each log the signal furthest from healthy."""
+    if not given:
         return
+    name = "" if decided is None else decided.log
+    traces = sorted(given, key=lambda item: item.name != name)[:_DRAWN]
     section = report.section("Signals against the healthy model")
+    if decided is not None:
+        value, unit = _displayed(decided.value, decided.unit)
+        healthy, _ = _displayed(decided.expected, decided.unit)
+        section.text(
+            f"Furthest from healthy is {decided.name} of {decided.log}: {value:.4g} {unit}, "
+            f"healthy {healthy:.4g} {unit}, {decided.score:+.3g} deviations."
+        )
     for item in traces:
         named = " and the model with what is named" if item.panels[0].named is not None else ""
         text = f"{item.name} over the healthy model in the same test{named}"
@@ -124,9 +160,12 @@ def _signals(report: Report, traces: Sequence[Traces]) -> None:
 def _features(report: Report, result: Diagnosis) -> None:
     ranked = sorted(result.features, key=lambda item: -abs(item.score))
     rows: list[tuple[object, ...]] = [
-        (m.log, m.name, m.unit, m.value, m.expected, m.score, m.explained / m.deviation)
+        (
+            m.log, m.name, _displayed(m.value, m.unit)[1], _displayed(m.value, m.unit)[0],
+            _displayed(m.expected, m.unit)[0], m.score, m.explained / m.deviation,
+        )
         for m in ranked
-    ]
+    ]  # fmt: skip
     names: tuple[str, ...] = (
         "log",
         "feature",
@@ -142,6 +181,8 @@ def _features(report: Report, result: Diagnosis) -> None:
         rows, names, formats = [row[:-1] for row in rows], names[:-1], formats[:-1]
     else:
         text += " Explained: what the most probable cause accounts for, in the same measure."
+    if len(result.logs) == 1:  # one log need not be named in each row
+        rows, names, formats = [row[1:] for row in rows], names[1:], formats[1:]
     section = report.section("Features")
     section.figure(
         features_figure(result.features),

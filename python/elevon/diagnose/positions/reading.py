@@ -19,6 +19,7 @@ from elevon.diagnose.engine.table import FeatureTable, FeatureVector
 from elevon.diagnose.positions.features import FEATURES, features_of
 from elevon.diagnose.positions.log import RUN_IN, prepared
 from elevon.experiment import Experiment, Inputs, Variant
+from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -177,7 +178,11 @@ class PositionReading(Reading):
                 "Difference of the two positions", "deg", [_gap(s, ratio) for s in sources]
             ),
             DrawnSignal("Torque current", "A", [s.current[good] for s in sources]),
-            DrawnSignal("Motor speed", "rad/s", [s.speed[good] for s in sources]),
+            DrawnSignal(
+                "Motor speed",
+                "rpm",
+                [np.asarray(to_display(s.speed[good], "rpm")) for s in sources],
+            ),
         ]
 
     def same(self, other: Reading) -> bool:

@@ -21,7 +21,7 @@ from elevon.experiment import Experiment, Inputs, Variant, signals_by_role
 from elevon.logs.log import Log, on_clock
 from elevon.parameters.records import wirings
 from elevon.simulate.prepare import solver_step
-from elevon.units import to_display
+from elevon.units import display_unit, to_display
 
 #: What is put in, not measured.
 INPUTS = frozenset(["command", "load"])
@@ -285,7 +285,7 @@ class RoleReading(Reading):
         sources: list[Mapping[str, Floats]] = [self.seen, *self._channels(units)]
         out = []
         for role in [r for r in _DRAWN if all(r in channels for channels in sources)][:3]:
-            unit = "mm" if self.log.units[role] == "m" else self.log.units[role]
+            unit = display_unit(self.log.units[role])
             lines = [np.asarray(to_display(channels[role], unit)) for channels in sources]
             out.append(DrawnSignal(role.replace("_", " ").capitalize(), unit, lines))
         return out
