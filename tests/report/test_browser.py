@@ -10,7 +10,7 @@ from tests.live.browser import browser, needs_browser
 pytestmark = [pytest.mark.long, needs_browser]
 
 X = np.linspace(0.0, 2.0, 400)
-SHOWN = "getComputedStyle(document.querySelector('{}')).display !== 'none'"
+VISIBLE = "getComputedStyle(document.querySelector('{}')).display !== 'none'"
 ZOOMED = "[...document.querySelectorAll('.panel > button')].map(b => !b.hidden)"
 
 
@@ -90,10 +90,10 @@ def test_a_zoom_moves_all_panels_of_one_abscissa_and_goes_back(run, path):
 
 def test_paper_and_a_reader_without_scripts_have_the_drawings(run, path):
     page, _ = _opened(run, path)
-    assert not page.evaluate(SHOWN.format(".elevon-chart > svg"))
+    assert not page.evaluate(VISIBLE.format(".elevon-chart > svg"))
     page.emulate_media(media="print")
-    assert page.evaluate(SHOWN.format(".elevon-chart > svg"))
-    assert not page.evaluate(SHOWN.format(".panels"))
+    assert page.evaluate(VISIBLE.format(".elevon-chart > svg"))
+    assert not page.evaluate(VISIBLE.format(".panels"))
     page.close()
     context = run.new_context(java_script_enabled=False)
     page = context.new_page()

@@ -195,10 +195,10 @@ def _legends_aside(figure: Figure) -> None:
         # Whoever gave a place outside has chosen; there is no public way to ask.
         if legend is None or legend._bbox_to_anchor is not None:  # type: ignore[attr-defined]
             continue
-        beside = bool(axes.get_title("left") or axes.get_title())
-        legend.set_loc("upper left" if beside else "lower right")
+        titled = bool(axes.get_title("left") or axes.get_title())
+        legend.set_loc("upper left" if titled else "lower right")
         legend.set_bbox_to_anchor((1.0, 1.0), transform=axes.transAxes)
-        legend.set_ncols(1 if beside else min(4, len(legend.get_texts())))
+        legend.set_ncols(1 if titled else min(4, len(legend.get_texts())))
 
 
 def _svg_text(figure: Figure, name: str, **options: Any) -> str:

@@ -192,8 +192,8 @@ def _lines(axes: Axes, names: Mapping[str, str], ink: str) -> tuple[list[Panel],
         elif ordinary and (order := _order(x, line)) is not None:
             look = _look(line, ink)
             name = _label(line) or names.get(look["colour"], "") or _plain(axes.get_ylabel())
-            own = {"name": name or "value", "own": bool(_label(line))}
-            series.append(look | own | _values(line, x[order], y[order]))
+            title = {"name": name or "value", "own": bool(_label(line))}
+            series.append(look | title | _values(line, x[order], y[order]))
         else:
             shapes.append(_path(line, x, y, ink))
     return series, shapes

@@ -122,7 +122,7 @@ def chart(
 
 
 def figure(svg: str, panels: Sequence[Mapping[str, Any]], columns: int, caption: str) -> str:
-    """Return a figure whose drawing gives way to charts of the same data where scripts run.
+    """Return a figure whose drawing is replaced by charts of the same data where scripts run.
 
     Parameters
     ----------
