@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from elevon import Channel, Clock, Recording
 from elevon.errors import InputError, OutputExistsError, UnitError, UnknownNameError
-from elevon.report.uplot import assets, chart, page, thinned
+from elevon.report.thinning import thinned
+from elevon.report.uplot import assets, chart, page
 from tests.recording.make import ordinary
 
 

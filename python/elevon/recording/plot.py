@@ -165,7 +165,8 @@ def _shade(axis: Axes, marked: list[Band], *, named: bool) -> None:
 
 
 def _draw(axis: Axes, panel: Panel, name_clock: bool) -> None:
-    from elevon.report.uplot import COLOURS, thinned
+    from elevon.report.thinning import thinned
+    from elevon.report.uplot import COLOURS
 
     for k, (name, values) in enumerate((panel.lines | panel.others).items()):
         time, line = panel.time, values

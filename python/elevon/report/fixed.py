@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.report.thinning import thinned
 
 _WIDTH, _LEFT, _TOP, _FOOT = 900.0, 64.0, 8.0, 58.0
 _SLICES = 1600
@@ -31,8 +32,6 @@ def drawing(
 
     Holes of a line (NaN) stay holes; extremes of many samples stay.
     """
-    from elevon.report.uplot import thinned
-
     at, drawn = thinned(time, lines, _SLICES)
     with np.errstate(divide="ignore", invalid="ignore"):
         if logarithmic:

@@ -5,7 +5,6 @@ The drawing stays in the page: it is printed, and is what a reader without scrip
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.report.thinning import packed, thinned
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -56,12 +56,6 @@ def panels_of(figure: Figure, ink: str) -> list[Panel] | None:
 def columns_of(figure: Figure) -> int:
     """Return how many axes stand side by side."""
     return len({round(axes.get_position().x0, 2) for axes in figure.axes})
-
-
-def packed(values: npt.ArrayLike, kind: str = "<f4") -> str:
-    """Return numbers as the base64 of their bytes."""
-    with np.errstate(over="ignore"):  # beyond float32 is drawn as missing
-        return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode("ascii")
 
 
 def _beyond(axes: Axes) -> bool:
@@ -223,8 +217,6 @@ def _look(line: Line2D, ink: str) -> Panel:
 
 
 def _values(line: Line2D, x: Floats, y: Floats) -> Panel:
-    from elevon.report.uplot import thinned
-
     # Two values at one abscissa (an edge) stay two: a chart has one column for each.
     x = x + np.arange(x.size) * 1e-12 * float(np.ptp(x) if x.size else 0.0)
     time, lines = thinned(x, {"y": y}, _MOST_POINTS)

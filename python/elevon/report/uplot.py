@@ -17,13 +17,12 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.report.fixed import drawing
-from elevon.report.panels import packed, with_times_once
+from elevon.report.panels import with_times_once
 from elevon.report.policy import policy
+from elevon.report.thinning import packed, thinned
 
 COLOURS = ("#2f7fd1", "#e0782f", "#2f9e6e", "#d1483c", "#8a6fd0", "#8a929d", "#b8860b", "#0f8b8d")
 """Of middle lightness, legible on white and near-black, distinct to the colour-blind."""
-
-_MOST_POINTS = 20_000
 
 
 @cache
@@ -190,50 +189,6 @@ def page(title: str, body: str) -> str:
         f"<title>{escape(title)}</title><style>{look}</style>\n{assets()}</head>\n"
         f"<body><h1>{escape(title)}</h1>\n{body}\n</body></html>\n"
     )
-
-
-def thinned(
-    time: Floats, values: Mapping[str, Floats], most: int = _MOST_POINTS
-) -> tuple[Floats, dict[str, Floats]]:
-    """Keep the least and the greatest value of each of equal slices of the samples.
-
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        Abscissa.
-    values : mapping of str to ndarray, shape (n,)
-        Lines.
-    most : int
-        The largest number of points selected.
-
-    Returns
-    -------
-    time : ndarray, shape (m,)
-        As given when n <= most, else two instants for each slice.
-    values : dict of str to ndarray, shape (m,)
-        As given, or the extremes in the order in which they occur; a slice with no finite value is
-        NaN.
-    """
-    if time.size <= most:
-        return time, dict(values)
-    edges = np.unique(np.linspace(0, time.size, most // 2 + 1).astype(np.intp))
-    starts = edges[:-1]
-    middles = (starts + edges[1:]) // 2
-    selected = np.empty(2 * starts.size)
-    selected[0::2], selected[1::2] = time[starts], time[middles]
-    return selected, {name: _extremes(line, starts) for name, line in values.items()}
-
-
-def _extremes(line: Floats, starts: npt.NDArray[np.intp]) -> Floats:
-    finite = np.isfinite(line)
-    low = np.minimum.reduceat(np.where(finite, line, np.inf), starts)
-    high = np.maximum.reduceat(np.where(finite, line, -np.inf), starts)
-    with np.errstate(invalid="ignore"):  # a slice without any value has no middle
-        rising = line[starts] <= (low + high) / 2
-    pair = np.empty(2 * starts.size)
-    pair[0::2], pair[1::2] = np.where(rising, low, high), np.where(rising, high, low)
-    pair[~np.isfinite(pair)] = np.nan
-    return pair
 
 
 def _interrupted(
