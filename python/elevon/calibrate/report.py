@@ -48,9 +48,9 @@ def calibration_report(
     facts = result.facts
     names = ", ".join(log.name for log in result.logs)
     report = Report(f"Calibration of {result.name}", f"From {names}. {_scale(facts)}", date=date)
-    found, missing = sum(i.in_set for i in result.estimates), len(result.undetermined)
-    text = f"{found} parameters determined" + (f", {missing} not" if missing else "")
-    report.judge(text, "open" if missing or not found else "pass")
+    count, missing = sum(i.in_set for i in result.estimates), len(result.undetermined)
+    text = f"{count} parameters determined" + (f", {missing} not" if missing else "")
+    report.judge(text, "open" if missing or not count else "pass")
     report.fact("Parameters estimated", str(sum(i.in_set for i in result.estimates)))
     explained = facts.get("explained", {})
     for name, text, of in (

@@ -312,16 +312,16 @@ def _texts(axes: Axes, ink: str) -> list[Panel]:
     """Return words at places of the data; those with an arrow are no part of a chart."""
     from matplotlib.text import Annotation
 
-    found: list[Panel] = []
+    words: list[Panel] = []
     for item in axes.texts:
         place: Any = item.get_position() if item.get_transform() == axes.transData else None
         if isinstance(item, Annotation) and item.xycoords == "data":
             place = item.xy
         if place is None or not item.get_text():
             continue
-        found.append({
+        words.append({
             "kind": "text", "name": "", "text": _plain(item.get_text()),
             "colour": _colour(item.get_color(), ink), "align": item.get_horizontalalignment(),
             "x": float(place[0]), "y": float(place[1]),
         })  # fmt: skip
-    return found
+    return words
