@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
+from elevon.diagnose.engine.candidates import candidates_of
 from elevon.errors import FormatError, InputError
 from elevon.prognose import LAWS, Inspection, Mission, Seen, inspection, predict, respond
 from elevon.prognose.answer import Prognosis
@@ -51,6 +52,12 @@ def test_edges_are_those_of_the_fault_in_its_own_unit():
     data = cause(severity=3e-4, interval=[2.9e-4, 3.1e-4])
     seen = inspection(data, [law], usage=1.0).seen[law.key]
     assert seen.high == pytest.approx(1e-5 / 1.6449, rel=1e-3)
+    screw = candidates_of(Actuator.load("nasa-ballscrew"))
+    (edge,) = {c.high for c in screw if c.key == law.key}
+    data = cause(severity=0.98 * edge, interval=[0.97 * edge, 0.99 * edge])
+    near = [inspection(data, [law], usage=1.0, candidates=c).seen[law.key] for c in (screw, ())]
+    assert near[0].high > 2.0 * edge  # it may be more than diagnosis looks at
+    assert near[1].high < 0.01 * edge
 
 
 def test_use_beyond_any_life_is_refused(tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.diagnose.engine.answer import Diagnosis
+from elevon.diagnose.engine.candidates import CandidateFault, candidates_of
 from elevon.errors import InputError
 from elevon.prognose.answer import Prognosis
 from elevon.prognose.assumptions import assumptions
@@ -127,10 +128,11 @@ def _one(
 def _inspections(
     history: History | _Seen, model: Actuator, tables: ResponseTables, progress: Progress | None
 ) -> list[Inspection]:
+    candidates = candidates_of(model)
     if not isinstance(history, History):
-        return [_inspected(item, tables) for item in history]
+        return [_inspected(item, tables, candidates) for item in history]
     read = diagnosed(history, model, progress=progress)
-    return read.inspections(tables.laws, tables.units_by_name)
+    return read.inspections(tables.laws, tables.units_by_name, candidates)
 
 
 def next_inspection(
@@ -185,12 +187,19 @@ def _test(
         return None, [f"which test to look with is not known: {error}"]
 
 
-def _inspected(item: Inspection | tuple[float, Diagnosis], tables: ResponseTables) -> Inspection:
+def _inspected(
+    item: Inspection | tuple[float, Diagnosis],
+    tables: ResponseTables,
+    candidates: Sequence[CandidateFault],
+) -> Inspection:
     if isinstance(item, Inspection):
         return item
     usage, answer = item
     name = f"use {usage:g}"
-    return inspection(answer.to_dict(stored=False), tables.laws, usage=float(usage), name=name)
+    return inspection(
+        answer.to_dict(stored=False), tables.laws, usage=float(usage), name=name,
+        candidates=candidates,
+    )  # fmt: skip
 
 
 def fleet(

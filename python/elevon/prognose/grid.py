@@ -49,8 +49,10 @@ class Grid:
         index = np.zeros((1, len(at[0])), dtype=np.intp)
         weight = np.ones((1, len(at[0])))
         for axis, value in zip(self.axes, at, strict=True):
-            low = np.clip(np.searchsorted(axis, value, side="right") - 1, 0, len(axis) - 2)
-            share = np.clip((value - axis[low]) / (axis[low + 1] - axis[low]), 0.0, 1.0)
+            # Inner points alone are searched: no index is below the first cell or above the last.
+            low = np.searchsorted(axis[1:-1], value, side="right")
+            share = (value - axis[low]) / np.diff(axis)[low]
+            share = np.minimum(np.maximum(share, 0.0), 1.0)
             index = np.concatenate((index * len(axis) + low, index * len(axis) + low + 1))
             weight = np.concatenate((weight * (1.0 - share), weight * share))
         return index, weight

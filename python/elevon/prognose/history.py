@@ -13,14 +13,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date as calendar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
 from elevon.errors import FormatError, InputError, Interrupted, unknown
 from elevon.files import read_regular, visible
-from elevon.plain import keys_of
+from elevon.plain import Plain, keys_of
 from elevon.prognose.laws import LAWS
 from elevon.prognose.measured import read_measured
 from elevon.prognose.mission import UNITS_OF_USE
@@ -43,11 +44,63 @@ _LONGEST = 2**24
 _MOST = 1e9
 """Greatest use: a flight a minute, two thousand years."""
 
-_KEYS = frozenset(
-    {"usage", "unit", "date", "serial", "reset", "logs", "map", "healthy", "measured"}
-)
 #: What `elevon diagnose` writes beside the keys of its record.
 _ABOUT = frozenset({"schema", "units", "method", "seconds"})
+
+
+@dataclass(frozen=True)
+class InspectionStamp(Plain):
+    """What a history adds to a diagnosis, or says in its place; the keys of an inspection's file.
+
+    Attributes
+    ----------
+    usage : float
+        Use at it.
+    unit : str
+        Of use.
+    date, serial : str
+        Empty where not given.
+    reset : tuple of str
+        Parts made new after it.
+    logs : tuple of str
+        Files in the folder that are to be diagnosed.
+    map : str or tuple of str
+        Column map of all of them, or of each.
+    healthy : bool
+        Whether they serve as baseline.
+    measured : object
+        Requirements' own values.
+    """
+
+    usage: float
+    unit: str
+    date: str = ""
+    serial: str = ""
+    reset: tuple[str, ...] = ()
+    logs: tuple[str, ...] = ()
+    map: str | tuple[str, ...] = ()
+    healthy: bool = False
+    measured: Any = None
+
+    def check(self, place: Path) -> InspectionStamp:
+        """Return it with its date in the one form, or refuse what cannot be."""
+        if not 0 <= self.usage <= _MOST:
+            raise FormatError(
+                f"{place}: usage = {self.usage:g} is not a number from 0 to {_MOST:g}"
+            )
+        if self.unit not in UNITS_OF_USE:
+            raise FormatError(f"{place}: unit = {self.unit!r} is none of {', '.join(UNITS_OF_USE)}")
+        try:
+            date = self.date and calendar.fromisoformat(self.date).isoformat()
+        except ValueError as error:
+            raise FormatError(
+                f"{place}: date = {self.date!r} is not of the form 2026-11-22"
+            ) from error
+        if isinstance(self.map, tuple) and len(self.map) not in (0, len(self.logs)):
+            raise FormatError(
+                f"{place}: map names {len(self.map)} for {len(self.logs)} logs; one for each"
+            )
+        return replace(self, date=date)
 
 
 @dataclass(frozen=True)
@@ -94,7 +147,10 @@ class History:
     serial: str
 
     def inspections(
-        self, laws: Sequence[Law], requirements: Mapping[str, str] | None = None
+        self,
+        laws: Sequence[Law],
+        requirements: Mapping[str, str] | None = None,
+        candidates: Sequence[CandidateFault] = CANDIDATES,
     ) -> list[Inspection]:
         """Return what the filters take.
 
@@ -104,6 +160,8 @@ class History:
             Whose faults matter.
         requirements : mapping of str to str, optional
             Those that may have been measured, and the SI unit of each.
+        candidates : sequence of CandidateFault
+            What diagnosis looks for; default: a turning servo's.
 
         Raises
         ------
@@ -113,13 +171,14 @@ class History:
         """
         out = []
         for entry in self.entries:
-            _check_reset(entry, laws)
+            _check_reset(entry, laws, candidates)
             if entry.diagnosis is None:
                 raise InputError(f"{entry.path.name}: its logs have not been diagnosed")
             out.append(
                 inspection(
                     entry.diagnosis,
                     laws,
+                    candidates=candidates,
                     usage=entry.usage,
                     name=entry.path.name,
                     date=entry.date,
@@ -132,12 +191,12 @@ class History:
         return out
 
 
-def _check_reset(entry: HistoryEntry, laws: Sequence[Law]) -> None:
+def _check_reset(
+    entry: HistoryEntry, laws: Sequence[Law], candidates: Sequence[CandidateFault]
+) -> None:
     """Refuse a part made new that neither the laws nor diagnosis know: it is a slip of the pen."""
-    from elevon.diagnose.engine.candidates import CANDIDATES
-
     known = {law.key for law in (*LAWS.values(), *laws)}
-    known |= {f"{c.kind}@{place}" for c in CANDIDATES for place in (c.place, *c.same)}
+    known |= {f"{c.kind}@{place}" for c in candidates for place in (c.place, *c.same)}
     for key in entry.reset:
         if key not in known:
             raise unknown("fault", key, sorted(known), f"{entry.path}: reset")
@@ -209,51 +268,42 @@ def _entry(path: Path) -> tuple[HistoryEntry, str] | None:
         raise FormatError(f"{path}: is not JSON: {error}") from error
     if not isinstance(data, dict) or "usage" not in data:
         return None
-    usage = data["usage"]
-    if isinstance(usage, bool) or not isinstance(usage, (int, float)) or not 0 <= usage <= _MOST:
-        raise FormatError(f"{path}: usage = {usage!r} is not a number from 0 to {_MOST:g}")
-    unit = data.get("unit")
-    if unit not in UNITS_OF_USE:
-        raise FormatError(f"{path}: unit = {unit!r} is none of {', '.join(UNITS_OF_USE)}")
-    logs = _logs(path, data)
-    diagnosis = None if logs else data
-    if diagnosis is not None and "faults" not in data:
-        raise FormatError(f"{path}: has neither 'faults' (a diagnosis) nor 'logs' to be diagnosed")
     _check_keys(path, data)
+    stamp = _stamp(path, data)
+    if not stamp.logs and "faults" not in data:
+        raise FormatError(f"{path}: has neither 'faults' (a diagnosis) nor 'logs' to be diagnosed")
+    logs = _logs(path, stamp)
     missing = next((log for log, _ in logs if not log.is_file()), None)
     if missing is not None:
         raise InputError(f"{path}: the log {missing.name} is not there")
     entry = HistoryEntry(
-        path,
-        float(usage),
-        _date(path, data.get("date", "")),
-        str(data.get("serial", "")),
-        tuple(_texts(path, data, "reset")),
-        diagnosis,
-        logs,
-        bool(data.get("healthy", False)),
-        data.get("measured"),
+        path, stamp.usage, stamp.date, stamp.serial, stamp.reset, None if logs else data, logs,
+        stamp.healthy, stamp.measured,
+    )  # fmt: skip
+    return entry, stamp.unit
+
+
+def _stamp(path: Path, data: Mapping[str, Any]) -> InspectionStamp:
+    """The stamp alone: the JSON of a diagnosis lists its own logs, which it has been made from."""
+    made = {"logs", "map"} if "faults" in data else set()
+    stamp = {k: v for k, v in data.items() if k in keys_of(InspectionStamp) - made}
+    return InspectionStamp.from_dict(stamp, str(path)).check(path)
+
+
+def _logs(path: Path, stamp: InspectionStamp) -> tuple[MappedLog, ...]:
+    """The logs, each with its map."""
+    names = [stamp.map] * len(stamp.logs) if isinstance(stamp.map, str) else stamp.map
+    near = [path.parent / name if (path.parent / name).is_file() else name for name in names]
+    return tuple(
+        (path.parent / name, near[k] if near else None) for k, name in enumerate(stamp.logs)
     )
-    return entry, str(unit)
-
-
-def _logs(path: Path, data: Mapping[str, Any]) -> tuple[MappedLog, ...]:
-    """The logs, each with its map: ``map`` is one for all of them, or a list of one for each."""
-    names = _texts(path, data, "logs")
-    one = isinstance(data.get("map"), str)
-    maps = [data["map"]] * len(names) if one else _texts(path, data, "map")
-    if maps and len(maps) != len(names):
-        raise FormatError(f"{path}: map names {len(maps)} for {len(names)} logs; one for each")
-    near = [path.parent / name if (path.parent / name).is_file() else name for name in maps]
-    folder = path.parent
-    return tuple((folder / name, near[k] if near else None) for k, name in enumerate(names))
 
 
 def known_keys() -> frozenset[str]:
     """Return the keys that an inspection may have: its stamp's, and those of a diagnosis."""
     from elevon.diagnose.engine.answer import Diagnosis
 
-    return _KEYS | _ABOUT | keys_of(Diagnosis)
+    return keys_of(InspectionStamp) | _ABOUT | keys_of(Diagnosis)
 
 
 def _check_keys(path: Path, data: Mapping[str, Any]) -> None:
@@ -262,27 +312,8 @@ def _check_keys(path: Path, data: Mapping[str, Any]) -> None:
     known = known_keys()
     for key in data:
         if key not in known:
-            hint = did_you_mean(key, sorted(_KEYS))
+            hint = did_you_mean(key, sorted(keys_of(InspectionStamp)))
             raise FormatError(f"{path}: unknown key {key!r}{hint}")
-
-
-def _texts(path: Path, data: Mapping[str, Any], key: str) -> list[str]:
-    given = data.get(key, [])
-    # The JSON of a diagnosis lists its own logs; they are only to be diagnosed where it has none.
-    if key == "logs" and "faults" in data:
-        return []
-    if not isinstance(given, list) or not all(isinstance(item, str) for item in given):
-        raise FormatError(f"{path}: {key} = {given!r} is not a list of texts")
-    return given
-
-
-def _date(path: Path, given: Any) -> str:
-    if not given:
-        return ""
-    try:
-        return calendar.fromisoformat(str(given)).isoformat()
-    except ValueError as error:
-        raise FormatError(f"{path}: date = {given!r} is not of the form 2026-11-22") from error
 
 
 def diagnosed(
@@ -303,8 +334,6 @@ def diagnosed(
     Interrupted
         `progress` returned False.
     """
-    from dataclasses import replace
-
     if all(entry.diagnosis is not None for entry in history.entries):
         return history
     answer = _diagnosis_by(

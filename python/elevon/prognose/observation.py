@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
 from elevon.errors import InputError, quoted, unknown
 from elevon.units import parse_quantity
 
@@ -92,6 +93,7 @@ def inspection(
     date: str = "",
     reset: Sequence[str] = (),
     measured: Mapping[str, Measured] | None = None,
+    candidates: Sequence[CandidateFault] = CANDIDATES,
 ) -> Inspection:
     """Build an inspection from a diagnosis.
 
@@ -103,6 +105,8 @@ def inspection(
         Whose faults matter.
     usage, name, date, reset, measured
         As in `Inspection`.
+    candidates : sequence of CandidateFault
+        What diagnosis looks for, and how far; default: a turning servo's.
 
     Raises
     ------
@@ -114,7 +118,7 @@ def inspection(
         cause = _cause(data, law, name)
         limit = _detectable(data, law, name)
         if cause is not None:
-            read = _read(cause, law, limit, f"{name}: {law.key}")
+            read = _read(cause, law, limit, _edge(law, candidates), f"{name}: {law.key}")
         elif limit is not None:
             read = Seen(None, limit / DETECTED, limit / DETECTED)
         else:
@@ -184,11 +188,9 @@ def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
     return limit
 
 
-def _edge(law: Law) -> float:
+def _edge(law: Law, candidates: Sequence[CandidateFault]) -> float:
     """Return the greatest severity that diagnosis looks at, in the law's unit; none: infinite."""
-    from elevon.diagnose.engine.candidates import CANDIDATES
-
-    edges = (c.high for c in CANDIDATES if c.kind == law.kind and c.unit == law.unit)
+    edges = (c.high for c in candidates if c.kind == law.kind and c.unit == law.unit)
     return max(edges, default=np.inf)
 
 
@@ -209,7 +211,7 @@ def _range(kind: str, place: str, unit: str) -> tuple[float, float]:
     return min(item.minimum for item in records), max(item.maximum for item in records)
 
 
-def _read(cause: Mapping[str, Any], law: Law, limit: float | None, place: str) -> Seen:
+def _read(cause: Mapping[str, Any], law: Law, limit: float | None, edge: float, place: str) -> Seen:
     severity, low, high = _numbers(cause, law, place)
     if not (np.isfinite([severity, low, high]).all() and low <= severity <= high):
         raise InputError(f"{place}: severity {severity:g} is not within {low:g} to {high:g}")
@@ -218,7 +220,7 @@ def _read(cause: Mapping[str, Any], law: Law, limit: float | None, place: str) -
         raise InputError(
             f"{place}: severity {severity:g} {law.unit} is outside {least:g} to {most:g}"
         )
-    if high >= _AT_EDGE * _edge(law):  # it may be more than is looked at
+    if high >= _AT_EDGE * edge:  # it may be more than is looked at
         high = max(high, severity) + 4.0 * abs(severity)
     floor = _LEAST * max(abs(severity), limit or 0.0) or 1e-9
     return Seen(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -158,7 +159,13 @@ class Process:
         columns = [law.severity(damage[:, k]) for k, law in enumerate(self.laws)]
         return np.column_stack(columns)
 
-    def rate(self, units: UnitPopulation, damage: Floats, load: Floats) -> Floats:
+    def rate(
+        self,
+        units: UnitPopulation,
+        damage: Floats,
+        load: Floats,
+        drivers: Mapping[str, Floats] | None = None,
+    ) -> Floats:
         """Return the mean growth of each damage in one repetition, shape (n, k).
 
         Parameters
@@ -169,9 +176,12 @@ class Process:
             Where it is evaluated: not always the units' own.
         load : ndarray, shape (n,)
             Factor on the mission's loads.
+        drivers : mapping of str to ndarray, shape (n,), optional
+            Exposure there, where it is known already.
         """
         damage = np.minimum(damage, self._most)
-        drivers = self.response.exposed(self.severity(damage), load)
+        if drivers is None:
+            drivers = self.response.exposed(self.severity(damage), load)
         columns = []
         for k, law in enumerate(self.laws):
             modifier = self._modifiers[k][units.row[:, k], self._interval(k, damage[:, k])]
@@ -186,8 +196,7 @@ class Process:
         return out
 
     def _interval(self, k: int, damage: Floats) -> npt.NDArray[np.intp]:
-        points = self.shapes[k].damage
-        return np.clip(np.searchsorted(points, damage, side="right") - 1, 0, len(points) - 2)
+        return np.searchsorted(self.shapes[k].damage[1:-1], damage, side="right")
 
     def paces(self, severity: Floats) -> Floats:
         """Return each law's growth in the company of the others' faults, over it alone, (k,)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -82,7 +83,25 @@ class ResponseTables:
         Requirements are judged at the loads as the mission states them.
         """
         ones = np.ones(len(severity))
-        out = self.grid.interpolate(self._tables[1], self._at(severity, ones))
+        return self._with_limits(
+            self.grid.interpolate(self._tables[1], self._at(severity, ones)), severity
+        )
+
+    def state(self, severity: Floats, load: Floats) -> tuple[Floats, dict[str, Floats]]:
+        """Return `reserve` and `exposed` of the same units; one search where loads are fixed."""
+        if self.loaded:
+            return self.reserve(severity), self.exposed(severity, load)
+        both = self.grid.interpolate(self._both, self._at(severity, load))
+        reserves = len(self.requirements)
+        drivers = dict(zip(self.drivers, both[reserves:], strict=True))
+        return self._with_limits(both[:reserves], severity), drivers
+
+    @cached_property
+    def _both(self) -> Floats:
+        return np.hstack(self._tables[::-1])
+
+    def _with_limits(self, out: Floats, severity: Floats) -> Floats:
+        """Put limits on a fault itself in the place of what the tables say of them."""
         for k, requirement in enumerate(self.requirements):
             if requirement.measure == SEVERITY:
                 at = [law.key for law in self.laws].index(str(requirement.fault))
