@@ -13,6 +13,7 @@ from elevon.cli import main
 from elevon.demo.life import run as life_run
 from elevon.demo.life.results import Statement
 from elevon.demo.life.unit import demo_mission
+from elevon.plain import plain, read_plain
 from elevon.prognose import ResponseTables
 from elevon.prognose.grid import Grid
 from elevon.prognose.life import Life
@@ -174,9 +175,7 @@ def test_an_edited_log_is_diagnosed_anew(story, tmp_path, monkeypatch):
 
 def test_what_a_diagnosis_says_comes_back_from_json():
     statement = Statement.of(Answer(0.01))
-    again = Statement.from_json(
-        json.loads(json.dumps({"data": statement.data, "text": statement.text}))
-    )
+    again = read_plain(Statement, json.loads(json.dumps(plain(statement))), "statement")
     assert again == statement
     assert (again.status, again.best) == ("faulty", [KEY])
 

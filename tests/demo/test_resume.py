@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,10 +23,11 @@ from elevon.calibrate.outcome import Calibration, by_path
 from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.cli import main
 from elevon.demo.finished import FinishedSteps, work_key
-from elevon.demo.results import Backlashes
+from elevon.demo.results import Backlashes, Step
 from elevon.demo.run import run_demo
 from elevon.errors import OutputExistsError
 from elevon.estimate import Estimate
+from elevon.plain import Plain
 from elevon.report import Report
 from elevon.report.checks import Check
 from elevon.reproduce.backlash.campaign import RowResult
@@ -89,7 +91,7 @@ def validation(name, logs, factor):
 
 def test_results_come_back_from_json_to_the_bit(base):
     table = backlashes()
-    again = Backlashes.from_json(json.loads(json.dumps(table.to_json())))
+    again = Backlashes.from_dict(json.loads(json.dumps(table.to_dict())))
     assert again.rows == table.rows
     assert repr(again.checks) == repr(table.checks)
     result = found(base)
@@ -127,6 +129,13 @@ def test_the_work_is_known_by_version_seed_and_actuator_files(base, monkeypatch)
     assert len(keys) == 5
 
 
+@dataclass(frozen=True)
+class Kept(Plain):
+    """A step's result."""
+
+    x: float
+
+
 def test_a_step_counts_only_as_it_was_kept(tmp_path):
     page = tmp_path / "page.html"
     page.write_text("page")
@@ -134,22 +143,21 @@ def test_a_step_counts_only_as_it_was_kept(tmp_path):
     assert not kept.begun(force=False)
     kept.begin()
     kept.save("backlash", "in", {"x": 1.5}, 2.5, [page])
-    read = lambda data: data["x"]  # noqa: E731
     assert kept.begun(force=False)
-    assert kept.load("backlash", "in", read) == (1.5, 2.5)
-    assert kept.load("backlash", "other", read) is None
-    assert kept.load("calibration", "in", read) is None
-    assert kept.load("backlash", "in", lambda data: data["y"]) is None
-    assert FinishedSteps(tmp_path, "b" * 32).load("backlash", "in", read) is None
+    assert kept.load("backlash", "in", Kept) == (Kept(1.5), 2.5)
+    assert kept.load("backlash", "other", Kept) is None
+    assert kept.load("calibration", "in", Kept) is None
+    assert kept.load("backlash", "in", Step) is None
+    assert FinishedSteps(tmp_path, "b" * 32).load("backlash", "in", Kept) is None
     with pytest.raises(OutputExistsError, match="other work"):
         FinishedSteps(tmp_path, "b" * 32).begun(force=False)
     assert not FinishedSteps(tmp_path, "b" * 32).begun(force=True)
     page.write_text("edited")
-    assert kept.load("backlash", "in", read) is None
+    assert kept.load("backlash", "in", Kept) is None
     page.write_text("page")
     file = tmp_path / "unfinished.log"
     file.write_text(file.read_text()[:-20])
-    assert FinishedSteps(tmp_path, "a" * 32).load("backlash", "in", read) is None
+    assert FinishedSteps(tmp_path, "a" * 32).load("backlash", "in", Kept) is None
     kept.clear()
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from elevon.actuator import Actuator
 from elevon.errors import FormatError, OutputExistsError
+from elevon.plain import read_plain
 from elevon.worklog import WorkLog, digest
 
 Result = TypeVar("Result")
@@ -84,9 +85,7 @@ class FinishedSteps:
         """Forget whatever was kept and name the work."""
         self._log = WorkLog.begin(self.path, self.key)
 
-    def load(
-        self, name: str, inputs: str, read: Callable[[Any], Result]
-    ) -> tuple[Result, float] | None:
+    def load(self, name: str, inputs: str, kind: type[Result]) -> tuple[Result, float] | None:
         """Return the result of a finished step and the seconds it took, or None.
 
         Parameters
@@ -95,16 +94,16 @@ class FinishedSteps:
             Of `STEPS`.
         inputs : str
             What the step is made from, in digits.
-        read : callable
-            Turns the JSON form into the result; a `KeyError`, `TypeError` or `ValueError` of it
-            means that it does not fit.
+        kind : type
+            Record of the result; what does not fit it is not taken.
         """
         log = self._open_log()
         item = None if log is None else log.intact(name)
         if item is None or item.data.get("inputs") != inputs:
             return None
         try:
-            return read(item.data["result"]), float(item.data["seconds"])
+            result: Result = read_plain(kind, item.data["result"], name)
+            return result, float(item.data["seconds"])
         except (FormatError, KeyError, TypeError, ValueError):
             return None
 

@@ -1,18 +1,18 @@
-"""Results of the demonstration's steps in a form that can be kept: to JSON and back, to the bit."""
+"""Results of the demonstration's steps in a form that can be kept."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
 
+from elevon.plain import Plain, key
 from elevon.report.checks import Check
 from elevon.reproduce.backlash import BacklashResult
 from elevon.reproduce.backlash.campaign import RowResult
-from elevon.reproduce.backlash.table import BacklashRow
 
 
 @dataclass(frozen=True)
-class Step:
+class Step(Plain):
     """A step of the demonstration.
 
     Attributes
@@ -25,22 +25,20 @@ class Step:
         What of it was kept from an interrupted run; empty where nothing was.
     """
 
+    COMPUTED = ("resumed",)
+
     name: str
     seconds: float
-    reused: str = ""
+    reused: Annotated[str, key("kept")] = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON form."""
-        return {
-            "name": self.name,
-            "seconds": self.seconds,
-            "resumed": bool(self.reused),
-            "kept": self.reused,
-        }
+    @property
+    def resumed(self) -> bool:
+        """Whether some of it was kept."""
+        return bool(self.reused)
 
 
 @dataclass(frozen=True)
-class Backlashes:
+class Backlashes(Plain):
     """The recomputed backlash table, without its traces."""
 
     rows: tuple[RowResult, ...]
@@ -50,16 +48,3 @@ class Backlashes:
     def of(cls, result: BacklashResult) -> Backlashes:
         """Take the table from the whole result."""
         return cls(tuple(result.rows), tuple(result.checks))
-
-    def to_json(self) -> dict[str, Any]:
-        """Return plain types."""
-        return {
-            "rows": [asdict(row) for row in self.rows],
-            "checks": [asdict(check) for check in self.checks],
-        }
-
-    @classmethod
-    def from_json(cls, data: Any) -> Backlashes:
-        """Return the table again."""
-        rows = (RowResult(**{**r, "measured": BacklashRow(**r["measured"])}) for r in data["rows"])
-        return cls(tuple(rows), tuple(Check(**check) for check in data["checks"]))

@@ -189,7 +189,7 @@ def _backlash(demo: Demo, progress: Progress | None) -> None:
 
     demo.backlash = demo.resumed(
         "published backlash table, fifteen backlashes",
-        Work("backlash", work, Backlashes.to_json, Backlashes.from_json, files=[page]),
+        Work("backlash", work, Backlashes, files=[page]),
     )
 
 
@@ -242,14 +242,7 @@ def _calibrate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> N
 
     demo.calibration = demo.resumed(
         "calibration on three logs",
-        Work(
-            "calibration",
-            work,
-            Calibration.to_dict,
-            Calibration.from_dict,
-            inputs_of(logs),
-            [target],
-        ),
+        Work("calibration", work, Calibration, inputs_of(logs), [target]),
     )
     demo.truth = _truth(demo)
 
@@ -285,8 +278,7 @@ def _validate(demo: Demo, progress: Progress | None, logs: Sequence[Path]) -> No
             Work(
                 piece,
                 lambda: validate(demo.logs, actuator, progress=share),
-                Validation.to_dict,
-                Validation.from_dict,
+                Validation,
                 inputs_of(logs, actuator.hash),
             ),
         )

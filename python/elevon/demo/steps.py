@@ -6,18 +6,19 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from elevon.actuator import Actuator
 from elevon.demo.finished import FinishedSteps
 from elevon.demo.results import Step
+from elevon.plain import plain
 
 Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
 class Work(Generic[Result]):
-    """A step that can be kept: how it is done, and its result's way to JSON and back.
+    """A step that can be kept: how it is done, and what kind of record it gives.
 
     Attributes
     ----------
@@ -25,8 +26,8 @@ class Work(Generic[Result]):
         Its name in the log of finished steps.
     do : callable
         Does it.
-    write, read : callable
-        Result to plain types and back.
+    kind : type
+        Of its result: a record, kept as JSON and read back equal.
     inputs : str
         What it is made from, in digits.
     files : sequence of Path
@@ -35,8 +36,7 @@ class Work(Generic[Result]):
 
     piece: str
     do: Callable[[], Result]
-    write: Callable[[Result], Any]
-    read: Callable[[Any], Result]
+    kind: type[Result]
     inputs: str = ""
     files: Sequence[Path] = ()
 
@@ -78,7 +78,7 @@ class Story:
     def resumed(self, name: str, work: Work[Result]) -> Result:
         """Take a step's result from an interrupted run, or do it and keep its result."""
         begin = clock.perf_counter()
-        stored = self.finished.load(work.piece, work.inputs, work.read)
+        stored = self.finished.load(work.piece, work.inputs, work.kind)
         if stored is not None:
             result, before = stored
             text = f"kept from the interrupted run, which took {before:.1f} s for it"
@@ -86,7 +86,7 @@ class Story:
             return result
         result = self.timed(name, work.do)
         seconds = clock.perf_counter() - begin
-        self.finished.save(work.piece, work.inputs, work.write(result), seconds, work.files)
+        self.finished.save(work.piece, work.inputs, plain(result), seconds, work.files)
         return result
 
     def _note(self, name: str, seconds: float, reused: str) -> None:

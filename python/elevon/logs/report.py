@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from elevon.plain import Plain, key
 
 Level = Literal["info", "warning"]
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Plain):
     """One thing seen: its level, the channel or clock, a code for programs, a text for people."""
 
     level: Level
@@ -17,13 +19,9 @@ class Finding:
     code: str
     text: str
 
-    def to_dict(self) -> dict[str, str]:
-        """Return it as plain types."""
-        return {"level": self.level, "place": self.place, "code": self.code, "text": self.text}
-
 
 @dataclass(slots=True)
-class ImportReport:
+class ImportReport(Plain):
     """The report of one import.
 
     Attributes
@@ -43,7 +41,7 @@ class ImportReport:
     """
 
     source: str
-    file_format: str
+    file_format: Annotated[str, key("format")]
     clocks: dict[str, dict[str, Any]] = field(default_factory=dict)
     channels: list[dict[str, Any]] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
@@ -60,14 +58,3 @@ class ImportReport:
     def has(self, code: str) -> bool:
         """Whether a finding of this code was made."""
         return any(finding.code == code for finding in self.findings)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the report as plain types."""
-        return {
-            "source": self.source,
-            "format": self.file_format,
-            "clocks": self.clocks,
-            "channels": self.channels,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "synchronisation": self.synchronisation,
-        }

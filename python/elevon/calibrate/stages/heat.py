@@ -25,7 +25,6 @@ _COPPER = 0.05  # of a resistance from a datasheet
 _BIN = 2.0  # s over which channels are averaged
 _WINDOW = 20.0  # s of one reading of the resistance
 _SLOW = 0.2  # of the largest speed: a window reads the resistance in motion
-_LONGEST_STEP = 2.0  # s of the network's steps
 _RISE = 2.0  # K at least that a temperature must have changed
 _OPEN = 0.15  # of the nut's heat, that a determined network may leave open
 _TOO_COOL = "the log is too short or too cool to determine it"

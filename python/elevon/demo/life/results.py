@@ -39,11 +39,6 @@ class Statement:
 
         return cls(answer.to_dict(), sentence(answer))
 
-    @classmethod
-    def from_json(cls, data: Any) -> Statement:
-        """Return it again."""
-        return cls(dict(data["data"]), str(data["text"]))
-
     @property
     def status(self) -> str:
         """``healthy`` or ``faulty``."""

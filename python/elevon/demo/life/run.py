@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,6 @@ from elevon.demo.life.unit import (
 from elevon.demo.steps import Work
 from elevon.errors import Interrupted, OutputExistsError
 from elevon.logs.log import Log
-from elevon.plain import plain, read_plain
 from elevon.prognose import GrowthFilter, Process, Prognosis, respond
 from elevon.prognose.life import Life
 from elevon.progress import Progress, part
@@ -93,8 +91,7 @@ def run_life(
         Work(
             "life",
             lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
-            plain,
-            lambda data: read_plain(Life, data, "life"),
+            Life,
         ),
     )
     _calibrate(demo, part(progress, 0.15, 0.4))
@@ -171,14 +168,7 @@ def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
 
     demo.calibration = demo.resumed(
         "calibration on the first healthy logs",
-        Work(
-            "calibration",
-            work,
-            Calibration.to_dict,
-            Calibration.from_dict,
-            inputs_of(files),
-            [target],
-        ),
+        Work("calibration", work, Calibration, inputs_of(files), [target]),
     )
 
 
@@ -226,8 +216,7 @@ def _visit(demo: LifeDemo, baselines: list[Log], flt: Any, usage: float, number:
         Work(
             f"inspection-{number}",
             lambda: Statement.of(diagnose(read_drive_logs([log]), actuator, baselines=baselines)),
-            asdict,
-            Statement.from_json,
+            Statement,
             inputs_of([log, *demo.healthy], actuator.hash),
         ),
     )

@@ -52,7 +52,7 @@ class RowResult:
         """Recovered less put in."""
         return self.backlash_out_deg - self.backlash_in_deg
 
-    def to_dict(self) -> dict[str, object]:
+    def printed(self) -> dict[str, object]:
         """Return one row of the command's JSON object."""
         return {
             "row": self.measured.row,
@@ -88,7 +88,7 @@ class BacklashResult:
             **verdict(self.checks),
             "encoder_count_deg": self.encoder_count_deg,
             "flat_length_rank_correlation": _rank_correlation(self.rows),
-            "rows": [row.to_dict() for row in self.rows],
+            "rows": [row.printed() for row in self.rows],
             "sim_s": sum(float(run.meta["sim_s"]) for run in runs),
             "seed": self.blank.meta["seed"],
             "parameter_hash": self.blank.meta["parameter_hash"],
