@@ -11,6 +11,7 @@ import typer
 import elevon
 from elevon import _core, errors
 from elevon.actuator import Actuator, list_actuators
+from elevon.cli.help import example_of, help_rows
 from elevon.cli.registry import COMMANDS
 from elevon.extras import APART, EXTRAS
 from elevon.prognose import LAWS
@@ -80,11 +81,14 @@ def _command(command: Any, path: str) -> str:
     context = command.context_class(command, info_name=f"elevon {path}")
     usage = command.get_usage(context).removeprefix("Usage: ")
     text = f"{_help(command.help)}\n\n```text\n{usage}\n```\n\n"
-    lines = [item.get_help_record(context) for item in command.params]
-    rows = [[code(name), plain(meaning)] for name, meaning in filter(None, lines)]
+    lines = [row for _, group in help_rows(command, context) for row in group]
+    rows = [[code(name), plain(meaning)] for name, meaning in lines]
     rows = [row for row in rows if "-completion" not in row[0]]
     if rows:
         text += table(["name", "meaning"], rows) + "\n"
+    example = example_of(command, context.command_path)
+    if example:
+        text += f"```text\n{example}\n```\n\n"
     if hasattr(command, "list_commands"):
         for name in command.list_commands(context):
             below = command.get_command(context, name)

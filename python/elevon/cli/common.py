@@ -112,7 +112,24 @@ DetailsOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 
-LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Drive logs.")]
+OptionalActuatorArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="ACTUATOR", help="Only what this actuator has.", autocompletion=completion.actuators
+    ),
+]
+HistoryArgument = Annotated[
+    Path,
+    typer.Argument(metavar="HISTORY", help="Folder of inspections: diagnoses or logs (JSON)."),
+]
+HistoriesArgument = Annotated[
+    list[Path], typer.Argument(metavar="HISTORY", help="One folder of inspections a unit.")
+]
+MissionOption = Annotated[
+    Path, typer.Option("--mission", metavar="FILE", help="What the unit does and must hold (TOML).")
+]
+
+LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG", help="Drive logs.")]
 LoadcellOption = Annotated[
     list[Path] | None,
     typer.Option(

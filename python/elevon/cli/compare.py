@@ -40,7 +40,7 @@ def compare(
         bool, typer.Option("--faults-table", help="What each fault changes in either model.")
     ] = False,
     seed: common.SeedOption = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder for report.html.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for report.html.")] = None,
     force: common.ForceOption = False,
     date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
 ) -> Answer:

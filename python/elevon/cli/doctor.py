@@ -34,10 +34,7 @@ def doctor(
     settings: common.SetOption = None,
     force: common.ForceOption = False,
 ) -> Answer:
-    """Look at logs for the first time: columns, data, the model's fit, the verdict.
-
-    elevon doctor today.csv --actuator unit.toml --baseline new.csv --out look
-    """
+    """Look at logs for the first time: columns, data, the model's fit, the verdict."""
     from elevon.doctor.door import doctor as run
 
     if out is not None:

@@ -30,7 +30,7 @@ def fit_low(
         typer.Option(metavar="FILE", help="Scenario to fit to instead of the stated list."),
     ] = None,
     fault: common.FaultOption = None,
-    out: Annotated[Path | None, typer.Option(metavar="SET.toml", help="Write the set.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the set.")] = None,
     seed: common.SeedOption = 0,
     force: common.ForceOption = False,
 ) -> Answer:

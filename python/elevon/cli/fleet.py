@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,12 +19,10 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force")
 def fleet(
-    histories: Annotated[
-        list[Path], typer.Argument(metavar="HISTORY...", help="One folder a unit, of diagnoses.")
-    ],
+    histories: common.HistoriesArgument,
     *,
     actuator: common.ActuatorOption,
-    mission: Annotated[Path, typer.Option("--mission", metavar="FILE", help="Mission (TOML).")],
+    mission: common.MissionOption,
     early: Annotated[float, typer.Option(help="Cost of one unit of use thrown away.")] = 1.0,
     late: Annotated[float, typer.Option(help="Cost of a failure in service.")] = 10_000.0,
     visit: Annotated[float, typer.Option(help="Cost of a visit, for all units at it.")] = 500.0,

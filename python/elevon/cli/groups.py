@@ -7,6 +7,7 @@ from typing import Any
 import typer
 import typer.core
 
+from elevon.cli.help import write_example
 from elevon.errors import nearest
 
 # The root of the argument errors (bad option, missing argument, ...) of whichever click typer uses.
@@ -26,3 +27,18 @@ class NamingGroup(typer.core.TyperGroup):
             )
             raise UsageError(f"No such command '{args[0]}'.{hint}", ctx)
         return super().resolve_command(ctx, args)
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Write the example of a group that works by itself."""
+        write_example(self, ctx, formatter)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write each command with the first sentence of its help, whole."""
+        loaded = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        rows = [(name, _first_line(c.help)) for name, c in loaded if c is not None and not c.hidden]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+def _first_line(text: str | None) -> str:
+    return " ".join((text or "").partition("\n\n")[0].split())

@@ -25,7 +25,7 @@ app = typer.Typer(
 @command(app)
 def import_(
     *,
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Log files.")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG", help="Log files.")],
     out: Annotated[
         Path | None,
         typer.Option(

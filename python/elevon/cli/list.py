@@ -114,14 +114,7 @@ def parameters(
 
 @command(app)
 def faults(
-    actuator: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[ACTUATOR]",
-            help="Only the faults of this actuator.",
-            autocompletion=completion.actuators,
-        ),
-    ] = None,
+    actuator: common.OptionalActuatorArgument = None,
     *,
     fidelity: common.OnlyFidelityOption = None,
     not_modelled: common.NotModelledOption = False,
@@ -138,7 +131,8 @@ def faults(
     first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
     columns = ("kind", "places", "unit", "range", where, "effect", "source", "rate", "rate_source",
                "not_modelled")  # fmt: skip
-    return _answer("faults", listed, (*first, *columns))
+    spare = ("rate_source", "source", "rate", *(() if not_modelled else ("not_modelled", where)))
+    return _answer("faults", listed, (*first, *columns), spare)
 
 
 def _faults(
@@ -177,14 +171,7 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
 
 @command(app)
 def laws(
-    actuator: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[ACTUATOR]",
-            help="Only the laws of faults that this actuator has.",
-            autocompletion=completion.actuators,
-        ),
-    ] = None,
+    actuator: common.OptionalActuatorArgument = None,
 ) -> Answer:
     """List the laws by which faults grow with use: fault, unit, what drives them, source."""
     from elevon.actuator import Actuator
@@ -235,14 +222,7 @@ def waveforms() -> Answer:
 
 @command(app)
 def features(
-    actuator: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[ACTUATOR]",
-            help="Only what this actuator's signals allow.",
-            autocompletion=completion.actuators,
-        ),
-    ] = None,
+    actuator: common.OptionalActuatorArgument = None,
     *,
     fidelity: common.FidelityOption = "high",
 ) -> Answer:
@@ -301,12 +281,14 @@ def _needed(parameter: dict[str, Any]) -> str:
     return f"{parameter['name']}*" if parameter["default"] is None else str(parameter["name"])
 
 
-def _answer(what: str, rows: list[dict[str, Any]], columns: tuple[str, ...]) -> Answer:
+def _answer(
+    what: str,
+    rows: list[dict[str, Any]],
+    columns: tuple[str, ...],
+    optional: tuple[str, ...] = ("acts",),
+) -> Answer:
     cells = [[_cell(row[column]) for column in columns] for row in rows]
-    return Answer(
-        {what: rows},
-        lambda: print_table(columns, cells, optional=("rate_source", "acts", "not_modelled")),
-    )
+    return Answer({what: rows}, lambda: print_table(columns, cells, optional=optional))
 
 
 def _cell(value: Any) -> str:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elevon.cli import completion, interrupt
-from elevon.cli.common import SeedOption, SetOption, check_outputs, read_actuator
+from elevon.cli import common, completion, interrupt
+from elevon.cli.help import add_plain
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,90 +19,100 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+_Fidelity = Annotated[str, typer.Option(help="high or low.", autocompletion=completion.fidelities)]
+_Subject = Annotated[
+    str,
+    typer.Argument(
+        metavar="ACTUATOR|FILE",
+        help="Actuator by name or file, or a log or recording to replay.",
+        autocompletion=completion.actuators,
+    ),
+]
+_Calibrated = Annotated[
+    Path | None, typer.Option(help="Actuator file, as elevon calibrate writes it.")
+]
+_Mission = Annotated[Path | None, typer.Option(help="Mission, for the remaining life.")]
+_Port = Annotated[int, typer.Option(min=0, max=65535, help="0: a free one.")]
+_Host = Annotated[str, typer.Option(help="Address to listen on; not loopback: a token is needed.")]
+_NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Open no page.")]
+_Factor = Annotated[float, typer.Option(min=0.1, max=100.0, help="Simulated over wall time.")]
+_Out = Annotated[Path, typer.Option(metavar="DIR", help="Where recordings go.")]
+_HideTruth = Annotated[
+    bool, typer.Option("--hide-truth", help="Tell nobody which faults were set.")
+]
+_Model = Annotated[
+    str, typer.Option(metavar="ACTUATOR", help="Model beside the log that is replayed.")
+]
+_Static = Annotated[
+    Path | None,
+    typer.Option(metavar="DIR", help="Write the page with a recorded session instead."),
+]
+_Picture = Annotated[
+    Path | None, typer.Option(help="Write that session as an animated SVG instead.")
+]
+
+
+@add_plain(app)
 def live(
-    actuator: Annotated[
-        str,
-        typer.Argument(
-            metavar="[ACTUATOR|FILE]",
-            help="Actuator by name or file, or a log or recording to replay.",
-            autocompletion=completion.actuators,
-        ),
-    ] = "torino-rotary",
+    actuator: _Subject = "torino-rotary",
     *,
-    fidelity: Annotated[
-        str, typer.Option(help="high or low.", autocompletion=completion.fidelities)
-    ] = "high",
-    calibrated: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Actuator file, as elevon calibrate writes it."),
-    ] = None,
-    baseline: Annotated[
-        list[Path] | None,
-        typer.Option("--baseline", metavar="LOG", help="Healthy log; repeatable."),
-    ] = None,
-    mission: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Mission, for the remaining life.")
-    ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: a free one.")] = 8484,
-    host: Annotated[
-        str, typer.Option(help="Address to listen on; not loopback: a token is needed.")
-    ] = "127.0.0.1",
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Open no page.")] = False,
-    factor: Annotated[
-        float, typer.Option(min=0.1, max=100.0, help="Simulated over wall time.")
-    ] = 1.0,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where recordings go.")] = Path(),
-    hide_truth: Annotated[
-        bool, typer.Option("--hide-truth", help="Tell nobody which faults were set.")
-    ] = False,
-    map_: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="FILE", help="Column map of the log that is replayed."),
-    ] = None,
-    model: Annotated[
-        str,
-        typer.Option(metavar="ACTUATOR", help="Model beside the log that is replayed."),
-    ] = "torino-rotary",
-    static: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write the page with a recorded session instead."),
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write that session as an animated SVG instead."),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
-    seed: SeedOption = 0,
-    settings: SetOption = None,
+    fidelity: _Fidelity = "high",
+    calibrated: _Calibrated = None,
+    baseline: common.BaselineOption = None,
+    mission: _Mission = None,
+    port: _Port = 8484,
+    host: _Host = "127.0.0.1",
+    no_browser: _NoBrowser = False,
+    factor: _Factor = 1.0,
+    out: _Out = Path(),
+    hide_truth: _HideTruth = False,
+    map_: common.MapOption = None,
+    model: _Model = "torino-rotary",
+    static: _Static = None,
+    picture: _Picture = None,
+    force: common.ForceOption = False,
+    seed: common.SeedOption = 0,
+    settings: common.SetOption = None,
 ) -> None:
     """Show an actuator at real time in the browser: move it, break it, watch it being found out."""
-    from elevon.live.server import serve
-
-    check_outputs([static / "index.html" if static else None, picture], force=force)
+    common.check_outputs([static / "index.html" if static else None, picture], force=force)
     bench: LiveBench | LogReplay
     if map_ is not None or _is_log(actuator):
-        from elevon.live.replay import LogReplay
-
-        bench = LogReplay.of_file(
-            Path(actuator), read_actuator(model, settings), column_map=map_, factor=factor
-        )
+        bench = _replay(Path(actuator), model, settings, map_, factor)
     else:
         bench = _bench(
             str(calibrated or actuator), settings, fidelity=fidelity, seed=seed, factor=factor,
             out=out, baselines=baseline or [], mission=mission, hide_truth=hide_truth,
         )  # fmt: skip
     if static is not None:
-        from elevon.live.static import write_static
-
-        paths = write_static(bench, static, force=force)
-        sys.stdout.write(f"{len(paths)} files in {static}\n")
-        return
-    if picture is not None:
+        _page(bench, static, force=force)
+    elif picture is not None:
         _picture(bench, picture, force=force)
-        return
+    else:
+        _serve(bench, port, host, browser=not no_browser)
+
+
+def _replay(
+    log: Path, model: str, settings: list[str] | None, column_map: Path | None, factor: float
+) -> LogReplay:
+    from elevon.live.replay import LogReplay
+
+    actuator = common.read_actuator(model, settings)
+    return LogReplay.of_file(log, actuator, column_map=column_map, factor=factor)
+
+
+def _page(bench: LiveBench | LogReplay, folder: Path, *, force: bool) -> None:
+    from elevon.live.static import write_static
+
+    paths = write_static(bench, folder, force=force)
+    sys.stdout.write(f"{len(paths)} files in {folder}\n")
+
+
+def _serve(bench: LiveBench | LogReplay, port: int, host: str, *, browser: bool) -> None:
+    from elevon.live.server import serve
+
     with interrupt.telling(lambda: _story(bench)):
-        serve(bench, port=port, host=host, browser=not no_browser, ready=_ready)
+        serve(bench, port=port, host=host, browser=browser, ready=_ready)
 
 
 def _picture(bench: LiveBench | LogReplay, path: Path, *, force: bool) -> None:
@@ -142,7 +152,7 @@ def _bench(
             raise InputError(f"{path}: no such file")
     if fidelity not in ("high", "low"):
         raise InputError(f"--fidelity {fidelity!r}: high or low")
-    unit = LiveUnit(read_actuator(reference, settings), fidelity=fidelity, seed=seed)
+    unit = LiveUnit(common.read_actuator(reference, settings), fidelity=fidelity, seed=seed)
     return LiveBench(
         unit, factor=factor, folder=out, baselines=baselines, mission=mission,
         hide_truth=hide_truth,

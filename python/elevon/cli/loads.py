@@ -28,7 +28,7 @@ KINDS = (".csv", ".toml")
 def loads(
     flight: Annotated[
         Path,
-        typer.Argument(metavar="FLIGHT.csv", help="Columns with units; see docs/how-to/loads.md."),
+        typer.Argument(metavar="FLIGHT", help="Columns with units; see docs/how-to/loads.md."),
     ],
     *,
     actuator: ActuatorOption,

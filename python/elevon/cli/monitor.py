@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from elevon.cli import common
+from elevon.cli.help import add_plain
 from elevon.cli.output import answer, listed, print_json, say
 from elevon.errors import InputError
 from elevon.files import check_output
@@ -23,45 +24,52 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-@app.command()
+_Stream = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG", help="Drive logs; - reads lines from standard input as they come."
+    ),
+]
+_Baseline = Annotated[
+    list[Path], typer.Option("--baseline", metavar="LOG", help="Healthy log of it; repeatable.")
+]
+_Window = Annotated[
+    str | None,
+    typer.Option(help="Width of a window, such as '5 s'; default: period of the noted sine."),
+]
+_FalseAlarmTime = Annotated[
+    str, typer.Option("--false-alarm-time", help="Mean time between false alarms.")
+]
+_Fault = Annotated[
+    list[str] | None,
+    typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
+]
+_Days = Annotated[
+    int | None,
+    typer.Option(min=1, help="Days on which the unit is watched. Default: the logs; -: one."),
+]
+_Longest = Annotated[
+    str | None,
+    typer.Option(help="Longest of those days. Default: the logs'; -: that of the baselines."),
+]
+_State = Annotated[
+    Path | None,
+    typer.Option("--state", help="Of -: where the stream stands; goes on from there."),
+]
+
+
+@add_plain(app)
 def monitor(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="LOG...", help="Drive logs; - reads lines from standard input as they come."
-        ),
-    ],
+    logs: _Stream,
     *,
     actuator: common.ActuatorOption,
-    baseline: Annotated[
-        list[Path],
-        typer.Option("--baseline", metavar="LOG", help="Healthy log of that motion; repeatable."),
-    ],
-    window: Annotated[
-        str | None,
-        typer.Option(help="Width of a window, such as '5 s'; default: period of the noted sine."),
-    ] = None,
-    false_alarm_time: Annotated[
-        str, typer.Option("--false-alarm-time", help="Mean time between false alarms.")
-    ] = "1 h",
-    fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
-    ] = None,
-    days: Annotated[
-        int | None,
-        typer.Option(min=1, help="Days on which the unit is watched. Default: the logs; -: one."),
-    ] = None,
-    longest: Annotated[
-        str | None,
-        typer.Option(help="Longest of those days. Default: the logs'; -: that of the baselines."),
-    ] = None,
-    state: Annotated[
-        Path | None,
-        typer.Option(
-            "--state", metavar="FILE", help="Of -: where the stream stands; goes on from there."
-        ),
-    ] = None,
+    baseline: _Baseline,
+    window: _Window = None,
+    false_alarm_time: _FalseAlarmTime = "1 h",
+    fault: _Fault = None,
+    days: _Days = None,
+    longest: _Longest = None,
+    state: _State = None,
     loadcell: common.LoadcellOption = None,
     command: common.CommandOption = None,
     column_map: common.MapOption = None,
@@ -82,15 +90,20 @@ def monitor(
     unit = common.read_actuator(actuator, settings)
     if Path("-") in logs:
         _check_stream(logs, loadcell, command, json=json)
-        watch = _monitor(unit, healthy, options, command)
-        _watch(watch, healthy, column_map, state)
-        return
-    if state is not None:
+        _watch(_monitor(unit, healthy, options, command), healthy, column_map, state)
+    elif state is not None:
         raise InputError("--state: serves a stream; give - as the log")
+    else:
+        given = common.read_logs(logs, column_map, loadcell, command)
+        _answer(given, unit, healthy, options, json=json)
+
+
+def _answer(
+    logs: list[Log], unit: Actuator, healthy: list[Log], options: WatchOptions, *, json: bool
+) -> None:
     from elevon.diagnose.door import monitor as run
 
-    given = common.read_logs(logs, column_map, loadcell, command)
-    result = run(given, unit, healthy, **options._asdict())
+    result = run(logs, unit, healthy, **options._asdict())
     if json:
         print_json(result.to_dict(stored=False))
     else:

@@ -76,10 +76,7 @@ def new(
     ] = None,
     force: ForceOption = False,
 ) -> Answer:
-    """Write NAME.toml: an actuator from few numbers of a data sheet, or a variant of another.
-
-    elevon new mine --linear --supply 28V --power 50W --lead 2mm --gear 4 --encoder 1024
-    """
+    """Write NAME.toml: an actuator from few numbers of a data sheet, or a variant of another."""
     from elevon.cli.new_design import New, given_numbers
 
     options = {

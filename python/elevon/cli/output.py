@@ -101,7 +101,7 @@ class Advance(Protocol):
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Advance]:
-    """Show progress on stderr: a bar on a terminal, a line each tenth otherwise.
+    """Show progress on stderr: a bar on a terminal, a line each tenth otherwise; it ends at 100 %.
 
     Yields
     ------
@@ -110,7 +110,9 @@ def progress_bar(title: str) -> Iterator[Advance]:
         lost comes out here.
     """
     if not sys.stderr.isatty():
-        yield _plain_progress(title)
+        lines = _PlainProgress(title)
+        yield lines
+        lines.end()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -130,17 +132,24 @@ def progress_bar(title: str) -> Iterator[Advance]:
             return True
 
         yield advance
+        bar.update(task, completed=1.0)  # what was left out on the way is done, too
 
 
-def _plain_progress(title: str) -> Advance:
-    tenths = 0
+@dataclass
+class _PlainProgress:
+    """Lines on stderr, one a tenth."""
 
-    def advance(fraction: float) -> bool:
-        nonlocal tenths
+    title: str
+    tenths: int = 0
+
+    def __call__(self, fraction: float, /) -> bool:
         interrupt.check()
-        if int(fraction * 10) > tenths:
-            tenths = int(fraction * 10)
-            say(f"{title}: {tenths * 10} %")
+        if int(fraction * 10) > self.tenths:
+            self.tenths = int(fraction * 10)
+            say(f"{self.title}: {self.tenths * 10} %")
         return True
 
-    return advance
+    def end(self) -> None:
+        """Say that all is done, where something was said before."""
+        if 0 < self.tenths < 10:
+            say(f"{self.title}: 100 %")

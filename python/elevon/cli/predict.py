@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -19,12 +18,10 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force")
 def predict(
-    history: Annotated[
-        Path, typer.Argument(metavar="HISTORY", help="Folder of dated diagnoses or logs (JSON).")
-    ],
+    history: common.HistoryArgument,
     *,
     actuator: common.ActuatorOption,
-    mission: Annotated[Path, typer.Option("--mission", metavar="FILE", help="Mission (TOML).")],
+    mission: common.MissionOption,
     survive: Annotated[
         list[float] | None,
         typer.Option("--survive", metavar="N", help="Probability of the next N; repeatable."),

@@ -48,10 +48,17 @@ class LazyGroup(NamingGroup):
         return loaded
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the table of commands from the registry, importing none of them."""
-        rows = [(name, COMMANDS[name].help) for name in self.list_commands(ctx)]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
+        """Write the commands by purpose from the registry, importing none of them."""
+        names = self.list_commands(ctx)
+        widest = max(len(name) for name in names)
+        for group in dict.fromkeys(COMMANDS[name].group for name in names):
+            rows = [
+                (name.ljust(widest), COMMANDS[name].help)
+                for name in names
+                if COMMANDS[name].group == group
+            ]
+            with formatter.section(group):
+                formatter.write_dl(rows)
 
 
 app = typer.Typer(

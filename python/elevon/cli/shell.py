@@ -11,6 +11,7 @@ from typing import Any, get_type_hints
 import typer
 
 from elevon.cli import common
+from elevon.cli.help import PlainCommand, with_metavars
 from elevon.cli.output import print_json, say
 from elevon.files import check_output
 from elevon.report import Report
@@ -58,7 +59,7 @@ def command(
     """
 
     def add(work: Callable[..., Answer]) -> Callable[..., Answer]:
-        app.command(name)(_shell(work, (*shared, "json")))
+        app.command(name, cls=PlainCommand)(_shell(work, (*shared, "json")))
         return work
 
     return add
@@ -70,6 +71,7 @@ def _shell(work: Callable[..., Answer], shared: tuple[str, ...]) -> Callable[...
     hints = get_type_hints(work, include_extras=True)
     hints |= {name: _SHARED[name][0] for name in extra}
     hints.pop("return", None)
+    hints = with_metavars(hints)
 
     @wraps(work)
     def shell(**options: Any) -> int:

@@ -7,6 +7,7 @@ from typing import Any
 import typer
 
 from elevon.cli.groups import NamingGroup, UsageError
+from elevon.cli.help import styled
 from elevon.cli.reproduce.all_cases import reproduce_all
 from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cases import CASES
@@ -46,6 +47,6 @@ app = typer.Typer(
 )
 
 
-app.callback(invoke_without_command=True)(reproduce_all)
+app.callback(invoke_without_command=True)(styled(reproduce_all))
 for _case in CASES:
     add_command(app, _case)

@@ -30,7 +30,7 @@ _ONLY = Annotated[
 ]
 _DATA = Annotated[
     Path | None,
-    typer.Option("--data", metavar="FOLDER", help="With --all: the foreign data; else not run."),
+    typer.Option("--data", metavar="DIR", help="With --all: the foreign data; else not run."),
 ]
 _SEED = Annotated[
     int, typer.Option("--seed", min=0, help="With --all: seed of every random number.")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from elevon.cli.help import PlainCommand, with_metavars
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 from elevon.reproduce.catalogue import Published, published
 
@@ -22,7 +23,8 @@ Values = dict[str, Any]
 
 _JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 _OUT = Annotated[
-    Path | None, typer.Option("--out", help="Folder for report.html and the rows as CSV.")
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for report.html and the rows as CSV."),
 ]
 _FORCE = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 _SEED = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")]
@@ -107,16 +109,17 @@ def add_command(app: typer.Typer, case: PublishedCase) -> None:
         return _run(case, options)
 
     options = case.signature()
+    annotations = with_metavars({name: annotation for name, (annotation, _) in options.items()})
     kind = inspect.Parameter.KEYWORD_ONLY
     command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
-            inspect.Parameter(name, kind, default=default, annotation=annotation)
-            for name, (annotation, default) in options.items()
+            inspect.Parameter(name, kind, default=default, annotation=annotations[name])
+            for name, (_, default) in options.items()
         ]
     )
-    command.__annotations__ = {name: annotation for name, (annotation, _) in options.items()}
+    command.__annotations__ = annotations
     command.__doc__ = case.text
-    app.command(case.name)(command)
+    app.command(case.name, cls=PlainCommand)(command)
 
 
 def _run(case: PublishedCase, options: Options) -> int:

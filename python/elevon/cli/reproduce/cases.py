@@ -30,7 +30,11 @@ _REASSEMBLIES = Annotated[int, typer.Option("--reassemblies", min=4, help="Units
 _HEALTHY = Annotated[int, typer.Option("--healthy", min=8, help="Healthy units.")]
 _DATA = Annotated[
     Path,
-    typer.Option("--data", help="Folder with one CSV or CSV.gz a condition; not in this package."),
+    typer.Option(
+        "--data",
+        metavar="DIR",
+        help="Folder with one CSV or CSV.gz a condition; not in this package.",
+    ),
 ]
 
 
