@@ -8,7 +8,9 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate import read_logs
+from elevon.calibrate.acceptance import accept
 from elevon.calibrate.backlash import _spans, _unloaded, fit_backlash
+from elevon.calibrate.backlashes import mean_backlash
 from elevon.calibrate.zeros import position_estimates
 from elevon.cli import main
 from elevon.logs.log import Log
@@ -16,6 +18,7 @@ from tests.calibrate.foreign import NOLOAD, draw, run
 from tests.calibrate.foreign_files import Style, write_trial
 
 BACKLASHES = {"first": 0.37, "second": 1.20, "third": 1.70}
+NEAR = {"a": 0.43, "b": 0.44, "c": 0.46}
 
 
 @pytest.fixture(scope="module")
@@ -34,10 +37,20 @@ def logs(tmp_path_factory):
 
 def test_backlashes_that_differ_are_said(logs):
     estimates, findings = position_estimates(logs, Actuator.load("torino-rotary"))
-    paths = {item.path for item in estimates}
-    assert "backlash.total" not in paths
-    assert "sensor.encoder.offset" in paths
+    known = {item.path: item for item in estimates}
+    assert "sensor.encoder.offset" in known
     assert findings[0].startswith("backlashes differ: first.csv 0.37 deg, second.csv 1.20 deg")
+    # The mean, with the interval of one log: it holds each of them.
+    mean = known["backlash.total"]
+    assert mean.value == pytest.approx(math.radians(np.mean(list(BACKLASHES.values()))), rel=0.01)
+    assert mean.interval[0] < math.radians(0.37) < math.radians(1.70) < mean.interval[1]
+    # So wide an interval is not taken; logs that are nearer to each other give their mean.
+    assert accept([mean], None, Actuator.load("torino-rotary")) == []
+    one = fit_backlash(logs[:1], 124.0, 1e-4)
+    near = {n: replace(one, backlash=(math.radians(x), 1e-5)) for n, x in NEAR.items()}
+    width, std = mean_backlash(near).backlash
+    assert width == pytest.approx(math.radians(0.4433), rel=1e-3)
+    assert std == pytest.approx(math.radians(0.0153), rel=0.02)
 
 
 def test_each_log_has_its_own_backlash_when_asked(logs):

@@ -9,7 +9,9 @@ import pytest
 
 from elevon.cli import main
 from elevon.logs.formats.drive import write_drive_csv
+from elevon.logs.formats.table import RawTable
 from elevon.logs.importing import import_log
+from elevon.logs.maps.guess import guess_map
 from elevon.logs.maps.hints import role_hint, unit_hint
 
 LEAD = 5e-3  # m for one turn
@@ -111,6 +113,28 @@ def test_hints():
     assert role_hint("column_3") == ""
     assert unit_hint("x", "nonsense") == ""
     assert unit_hint("pos_mm", "") == "mm"
+
+
+@pytest.mark.parametrize(
+    ("names", "role"),
+    [
+        (("time_s", "position_deg", "speed_deg_s", "current_a"), "torque_current"),
+        (("time_s", "position_deg", "current_b", "current_a"), "current_a"),
+        (("time", "position", "speed", "current_a"), "current_a"),
+    ],
+)
+def test_a_last_word_is_the_unit_where_the_other_headers_end_in_theirs(names, role):
+    time = np.arange(0.0, 4.0, 0.01)
+    values = (time, 10.0 * np.sin(time), 10.0 * np.cos(time), np.sign(np.cos(time)))
+    table = RawTable("log.csv", dict(zip(names, values, strict=True)))
+    roles = {item.name: item.role for item in guess_map(table).columns}
+    assert roles["current_a"] == role
+
+
+def test_a_clock_whose_readings_repeat_has_a_unit():
+    time = np.repeat(np.arange(0.0, 40.0), 10)
+    table = RawTable("log.mat", {"t": time, "x": np.sin(time)})
+    assert guess_map(table).columns[0].unit in {"s", "ms"}
 
 
 def test_what_cannot_be_guessed_is_refused(tmp_path, capsys, motion):

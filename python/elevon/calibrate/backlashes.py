@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from statistics import fmean, stdev
 
 from elevon.calibrate.backlash import BacklashFit, fit_backlash, median_width
 from elevon.logs.log import Log
@@ -44,6 +45,15 @@ def _apart(least: float, most: float, count: float, std: float) -> bool:
     return most - least > max(_COUNTS * count, _APART * most, _SIGMAS * std)
 
 
+def mean_backlash(backlashes: dict[str, BacklashFit]) -> BacklashFit:
+    """The mean of logs whose backlashes differ, its deviation that of one log about it."""
+    widths = [fit.backlash[0] for fit in backlashes.values()]
+    noise = max(fit.backlash[1] for fit in backlashes.values())
+    first = next(iter(backlashes.values()))
+    width = (fmean(widths), math.hypot(stdev(widths), noise))
+    return replace(first, backlash=width, degrees=len(widths) - 1, logs=tuple(backlashes))
+
+
 def pooled_backlash(backlashes: dict[str, BacklashFit]) -> BacklashFit:
     """Offset, gain and delay of the encoder over all logs; the backlash is the widest log's."""
     fits = list(backlashes.values())
@@ -69,13 +79,14 @@ def _mean(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 
 def backlashes_differ(backlashes: dict[str, BacklashFit], extra: float) -> str:
-    """Say that the backlashes differ, with each log's, in degrees."""
+    """Say that the backlashes differ, with each log's, in degrees, and what becomes of it."""
     each = ", ".join(
         f"{name} {math.degrees(fit.backlash[0] - extra):.2f} deg"
         for name, fit in backlashes.items()
     )
     return (
-        f"backlashes differ: {each}; backlash.total is left as it was "
+        f"backlashes differ: {each}; backlash.total is their mean with the interval of one log, or "
+        "left as it was where they differ by more than a quarter of it "
         "(--per-log backlash.total lists each "
         "log's with its interval)"
     )

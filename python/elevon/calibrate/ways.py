@@ -180,9 +180,13 @@ class _ClosedLoop:
         from elevon.calibrate.stages.closed_loop.predict import validate_loop
 
         _check_loop(actuator, request)
+        structure = actuator.parameters["control.structure"]
         result = calibrate_loop(
-            self.logs, actuator, free=request.free, transient=request.transient, progress=progress
-        )
+            self.logs, actuator,
+            # One that the caller sets is no question any more.
+            structure=str(structure.value) if structure.confidence == "override" else None,
+            free=request.free, transient=request.transient, progress=progress,
+        )  # fmt: skip
         offsets = None if result.promise is None else result.promise.offsets
         after = validate_loop(self.logs, result.actuator, request.transient, offsets)
         return _with(replace(result, validation=after), *filter(None, [self.why]))

@@ -8,7 +8,12 @@ from dataclasses import replace
 
 from elevon.actuator import Actuator
 from elevon.calibrate.backlash import BacklashFit, fit_backlash
-from elevon.calibrate.backlashes import backlashes_differ, differing_backlashes, pooled_backlash
+from elevon.calibrate.backlashes import (
+    backlashes_differ,
+    differing_backlashes,
+    mean_backlash,
+    pooled_backlash,
+)
 from elevon.calibrate.kinematics import CommandFit, speed_limit, speed_sensor
 from elevon.calibrate.named import named
 from elevon.estimate import Estimate, quantile
@@ -46,7 +51,7 @@ def position_estimates(
 def _backlash_estimates(
     logs: Sequence[Log], actuator: Actuator, each: bool
 ) -> tuple[list[Estimate], tuple[str, ...]]:
-    """Backlash and encoder; where backlashes differ the encoder alone, and each log's backlash."""
+    """Backlash and encoder; where backlashes differ their mean, and each log's."""
     value = actuator.parameters.value
     ratio, count = value("gear.ratio"), encoder_count(actuator)
     backlashes = differing_backlashes(logs, ratio, count)
@@ -64,7 +69,13 @@ def _backlash_estimates(
     if not backlashes:
         return estimates, ()
     others = [item for item in estimates if item.path != "backlash.total"]
-    return others, (backlashes_differ(backlashes, value("backlash.extra")),)
+    mean = _backlash(mean_backlash(backlashes), count, actuator)
+    total = [
+        replace(item, note=f"{item.note}; mean of logs that differ")
+        for item in mean
+        if item.path == "backlash.total"
+    ]
+    return [*total, *others], (backlashes_differ(backlashes, value("backlash.extra")),)
 
 
 def _own_backlash(name: str, backlash: BacklashFit, count: float, actuator: Actuator) -> Estimate:

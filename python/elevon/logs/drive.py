@@ -88,10 +88,10 @@ def _voltage(log: Log) -> Floats | None:
     return values if usable else None
 
 
-def groups_of(time: Floats) -> int:
-    """Return how many samples of a log of these instants [s] make one."""
+def groups_of(time: Floats, rate: float = RATE) -> int:
+    """Return how many samples of a log of these instants [s] make one, to keep a rate [Hz]."""
     period = float(np.median(np.diff(time)))
-    return max(1, int(1.0 / (period * RATE) + 1e-6))
+    return max(1, int(1.0 / (period * rate) + 1e-6))
 
 
 def group_means(values: Floats, count: int) -> Floats:
@@ -100,13 +100,13 @@ def group_means(values: Floats, count: int) -> Floats:
     return np.asarray(values[: whole * count].reshape(whole, count).mean(axis=1))
 
 
-def thinned(log: Log) -> Log:
-    """Return a log of at least `RATE`: means of groups, all channels and the clock alike.
+def thinned(log: Log, rate: float = RATE) -> Log:
+    """Return a log of at least a rate [Hz]: means of groups, all channels and the clock alike.
 
     A mean over a group acts on every channel in the same way, so no channel is late against
     another, and what is linear between them stays as it is.
     """
-    count = groups_of(log.time)
+    count = groups_of(log.time, rate)
     if count == 1:
         return log
     time = group_means(log.time, count)

@@ -15,7 +15,7 @@ from elevon.diagnose.positions.features import regress
 from elevon.diagnose.positions.lost_motion import carried
 from elevon.errors import InputError
 from elevon.logs.command.reconstruct import reconstruct
-from elevon.logs.drive import drive_log
+from elevon.logs.drive import drive_log, thinned
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 RUN_IN = 1.0  # s left out: the start of the motion
 _RATIO = 0.05  # relative: a gear ratio seen in the log this far off is another actuator's
+LONGEST = 40.0  # s that are read: every candidate is run through them
+_RATE = 400.0  # Hz, at least, of a log that is longer: the model's signals have no more
 _LEAST_TIME = 4.0  # s of log
 _LEAST_LEFT = _LEAST_TIME - RUN_IN  # s of it that can be used
 _MOVING = 0.1  # of the highest speed
@@ -45,7 +47,7 @@ def prepared(log: Log, actuator: Actuator) -> Log:
     """
     if prepared in log.memory:
         return log
-    log = drive_log(log)
+    log = _first_part(drive_log(log))
     if not log.has("output_position", "motor_position"):
         raise InputError(f"{log.name}: diagnosis by the model needs both positions (r4820, r4821)")
     if log.duration < _LEAST_TIME:
@@ -62,6 +64,18 @@ def prepared(log: Log, actuator: Actuator) -> Log:
     ready = replace(log.with_channels(command=wave), gain=gain, good=good)
     ready.memory[prepared] = True
     return ready
+
+
+def _first_part(log: Log) -> Log:
+    """A long log as far as it is read, from the run-in before it moves, at the model's rate."""
+    if log.duration <= LONGEST:
+        return log
+    speed = np.where(log.good, np.abs(log.speed), 0.0)
+    first = float(log.time[int(np.argmax(speed > _MOVING * speed.max()))])
+    start = max(min(first - RUN_IN, log.duration - LONGEST), 0.0)
+    keep = (log.time >= start) & (log.time <= start + LONGEST)
+    begin = float(log.time[int(np.argmax(keep))])
+    return thinned(log.part(keep, begin, begin + LONGEST), _RATE)
 
 
 def _command(log: Log, actuator: Actuator) -> tuple[Floats, tuple[float, float] | None]:

@@ -17,7 +17,7 @@ from elevon.diagnose.engine.days import DAILY, moved_value
 from elevon.diagnose.engine.reading import Days, DrawnSignal, Reading, ReplayUnit
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector
 from elevon.diagnose.positions.features import FEATURES, features_of
-from elevon.diagnose.positions.log import RUN_IN, prepared
+from elevon.diagnose.positions.log import LONGEST, RUN_IN, prepared
 from elevon.experiment import Experiment, Inputs, Variant
 from elevon.units import to_display
 
@@ -96,6 +96,7 @@ class PositionReading(Reading):
     SEVERITIES = (5, 2)
 
     def __init__(self, log: Log, actuator: Actuator) -> None:
+        self._whole = log.duration  # s
         self.log = prepared(log, actuator)
         self.actuator = of_a_magnet(actuator)
 
@@ -235,6 +236,8 @@ class PositionReading(Reading):
                 "no baseline of this test: how far a healthy unit deviates from the model is "
                 "assumed, small faults are not seen"
             )
+        if self._whole > LONGEST:
+            out.append(f"read for {LONGEST:g} s from where it begins to move")
         out += [text for role, text in _LOST.items() if not log.has(role)]
         if log.brake.unknown:
             out.append(

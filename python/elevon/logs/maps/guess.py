@@ -24,6 +24,7 @@ from elevon.units import parse_unit
 _EVEN = 0.25  # of the columns that rise, the one whose steps scatter least is the time
 _MOVES = 0.05  # of a clock's steps, at least, are no repetition: a command that steps is no clock
 _CURRENT = 0.2  # share of a column that acceleration, friction and speed must explain
+_PHASE = "current_a"
 _DEFAULT_UNITS = {
     "torque_current": "A", "current_ref": "A", "direct_current": "A", "supply_current": "A",
     "current_a": "A", "current_b": "A", "current_c": "A", "torque_voltage": "V",
@@ -120,7 +121,21 @@ def _headers(columns: Mapping[str, GuessedColumn]) -> None:
             continue
         columns[name].role = role
         columns[name].reasons.append("by its header")
+        if role == _PHASE and _in_units(name, hints, columns):
+            columns[name].role, columns[name].unit = "torque_current", "A"
+            columns[name].reasons.append("the other headers end in units: in A, not of phase a")
         _drop_odd_unit(columns[name])
+
+
+def _in_units(name: str, hints: Mapping[str, str], columns: Mapping[str, GuessedColumn]) -> bool:
+    """Whether a last word 'a' is the unit: most headers end in theirs, and no phase b is there."""
+    if not name.endswith("_a") or {"current_b", "current_c", "torque_current"} & set(
+        hints.values()
+    ):
+        return False
+    others = [item for other, item in columns.items() if other != name]
+    ending = sum(bool(item.unit) and "_" in item.name for item in others)
+    return 2 * ending > len(others)
 
 
 def _drop_odd_unit(item: GuessedColumn) -> None:
