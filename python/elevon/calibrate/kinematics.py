@@ -22,7 +22,7 @@ from elevon.logs.command.fit import WaveformFit, best_waveform, fit_waveform
 from elevon.logs.command.guess import FREE
 from elevon.logs.command.known import NotedCommand, align_noted, noted_values
 from elevon.logs.command.reconstruct import reconstruct
-from elevon.logs.log import Log
+from elevon.logs.log import Log, per_log
 from elevon.waveforms import evaluate
 
 #: Paths that come from positions alone, not from the dynamic fit.
@@ -86,6 +86,7 @@ class CommandFit:
         }
 
 
+@per_log
 def command_fit(log: Log, gain: float, limit: float) -> CommandFit | None:
     """Fit the command's waveform and the position gain of one log.
 

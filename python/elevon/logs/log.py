@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,7 @@ from elevon.recording.channel import Channel
 
 Bools = npt.NDArray[np.bool_]
 Value = TypeVar("Value")
+Arguments = ParamSpec("Arguments")
 #: Roles by whose channel the clock is chosen, where no other is named.
 _CLOCKS = ("speed_ref", "command", "output_position", "torque_current")
 _NEAR = 1.0  # s of the brake's level that a part of a log keeps beyond its ends
@@ -260,14 +261,17 @@ class Log:
         )
 
 
-def per_log(function: Callable[[Log], Value]) -> Callable[[Log], Value]:
-    """Make a function of a log keep its result with the log."""
+def per_log(
+    function: Callable[Concatenate[Log, Arguments], Value],
+) -> Callable[Concatenate[Log, Arguments], Value]:
+    """Make a function of a log, and of numbers beside it, keep its results with the log."""
 
     @wraps(function)
-    def once(log: Log) -> Value:
-        if function not in log.memory:
-            log.memory[function] = function(log)
-        return log.memory[function]  # type: ignore[no-any-return]
+    def once(log: Log, /, *given: Arguments.args, **named: Arguments.kwargs) -> Value:
+        work = (function, given, tuple(named.items())) if given or named else function
+        if work not in log.memory:
+            log.memory[work] = function(log, *given, **named)
+        return log.memory[work]  # type: ignore[no-any-return]
 
     return once
 
