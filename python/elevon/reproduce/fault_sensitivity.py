@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.compare import RATES, filtered
+from elevon.compare import RATES, compared_rate, filtered
 from elevon.data import read_table
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault, find_record
@@ -186,7 +186,7 @@ class _Runner:
             Run(self.actuator, item, self.seed, label)
             for item, label in zip(scenarios, labels, strict=True)
         ]
-        record = f"{RECORD}@{RATES[fidelity]}"
+        record = f"{RECORD}@{compared_rate(self.actuator, fidelity)}"
         recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
         ratio = self.actuator.parameters.value("gear.ratio")
         return [features(recording, ratio, self.start) for recording in recordings]
