@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
+from elevon.bench.procedure import SensorStep
 from elevon.bench.stand import ChannelSpec, Stand
 from elevon.errors import InputError
 from elevon.recording import Recording
@@ -70,6 +72,7 @@ def acquire(
     *,
     rate: float,
     seed: int,
+    sensors: Sequence[SensorStep] = (),
 ) -> Recording:
     """Return what the recorder keeps of a run.
 
@@ -87,7 +90,10 @@ def acquire(
         Hz; need be no whole number of steps.
     seed : int
         Of the channels' noise.
+    sensors : sequence of SensorStep
+        What is wrong with them.
     """
+    wrong = {step.channel: step for step in sensors}
     clock = np.asarray(run.clock().time, dtype=np.float64)
     time = np.arange(math.floor(clock[-1] * rate + 1e-9) + 1, dtype=np.float64) / rate
     rng = np.random.default_rng([seed, 2])
@@ -97,11 +103,12 @@ def acquire(
         digital = channel.unit == "1" or role.endswith(_DIGITAL)
         raw = np.asarray(channel.values, dtype=np.float64)
         sampled = _last_written(clock, raw, time) if digital else _filtered(clock, raw, time, rate)
+        sampled = _failed(sampled, wrong.get(role), channel.unit, time)
         values[name] = _sensed(sampled, stand.channels[role], channel.unit, rate, rng)
         units[name] = channel.unit
     names = dict(roles)
     if "load" in stand.channels:
-        force = np.interp(time, *load)
+        force = _failed(np.interp(time, *load), wrong.get("load"), "N", time)
         values[LOAD_CHANNEL] = _sensed(force, stand.channels["load"], "N", rate, rng)
         units[LOAD_CHANNEL] = "N"
         names["load"] = LOAD_CHANNEL
@@ -138,6 +145,21 @@ def _filtered(clock: Floats, values: Floats, time: Floats, rate: float) -> Float
         sections = butter(_ORDER, cutoff, fs=fast, output="sos")
         values = np.asarray(sosfiltfilt(sections, values), dtype=np.float64)
     return np.interp(time, clock, values)
+
+
+def _failed(values: Floats, step: SensorStep | None, unit: str, time: Floats) -> Floats:
+    """Return what a sensor passes on; its recorder's noise is added after it."""
+    if step is None:
+        return values
+    late = time >= parse_quantity(step.at, "s", "at")
+    if not late.any():
+        return values
+    wrong = step.gain * values + parse_quantity(step.offset, unit, "offset")
+    if step.fault == "dead":
+        wrong = np.zeros_like(values)
+    elif step.fault == "stuck":
+        wrong = np.full_like(values, values[int(np.argmax(late))])
+    return np.where(late, wrong, values)
 
 
 def _sensed(

@@ -13,11 +13,18 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop, target_force
-from elevon.bench.procedure import ForceStep, Procedure, RigStep, SettingsStep, TraceStep
+from elevon.bench.procedure import (
+    ForceStep,
+    Procedure,
+    RigStep,
+    SensorStep,
+    SettingsStep,
+    TraceStep,
+)
 from elevon.bench.rating import SHARE, holds, rated_factor
 from elevon.bench.rig import Conditions, draw_conditions, moved
 from elevon.bench.stand import Stand
-from elevon.errors import DivergedError, InputError
+from elevon.errors import DivergedError, InputError, unknown
 from elevon.faults import Fault
 from elevon.progress import Progress
 from elevon.recording import Recording
@@ -54,6 +61,8 @@ class LoadedSetup:
         What the operator set, by parameter.
     factor : float
         Of the commanded force: below one where the drive could not hold what is asked for.
+    sensors : tuple of SensorStep
+        What is wrong with the stand's own sensors.
     """
 
     trace: TraceStep
@@ -64,6 +73,7 @@ class LoadedSetup:
     force: ForceStep | None
     settings: dict[str, Any]
     factor: float = 1.0
+    sensors: tuple[SensorStep, ...] = ()
 
     @property
     def message(self) -> str:
@@ -109,6 +119,7 @@ def loaded_setups(
     settings: dict[str, Any] = dict(stand.settings)
     force: ForceStep | None = None
     rig: tuple[Term, ...] = ()
+    sensors: dict[str, SensorStep] = {}
     logs: list[LoadedSetup] = []
     for step in procedure.step:
         if isinstance(step, ForceStep):
@@ -117,6 +128,10 @@ def loaded_setups(
             rig = step.terms
         elif isinstance(step, SettingsStep):
             settings = {**settings, **step.parameters}
+        elif isinstance(step, SensorStep):
+            if step.channel not in stand.channels:
+                raise unknown("channel", step.channel, stand.channels, f"{procedure.name}: sensor")
+            sensors[step.channel] = step
         elif isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(logs))
             ready = actuator.with_values(settings, source="set on the bench", place=step.name)
@@ -125,13 +140,14 @@ def loaded_setups(
             factor = _rated(force_step, step, ready, conditions)
             logs.append(
                 LoadedSetup(
-                    step, ready, scenario, conditions, stand, force_step, dict(settings), factor
+                    step, ready, scenario, conditions, stand, force_step, dict(settings), factor,
+                    tuple(sensors.values()),
                 )
-            )
+            )  # fmt: skip
         else:
             raise InputError(
                 f"{procedure.name}: the stand {stand.name} has no {step.kind!r}; it has force, "
-                f"{'rig, ' if 'rig_speed' in stand.ports else ''}settings, trace"
+                f"{'rig, ' if 'rig_speed' in stand.ports else ''}settings, sensor, trace"
             )
     return logs
 
@@ -225,8 +241,9 @@ def run_loaded_batch(
     out = []
     for setup, run, (times, force, _) in zip(setups, runs, forces, strict=True):
         log = acquire(
-            run, roles, (times, force), setup.stand, rate=rate, seed=setup.conditions.seed
-        )
+            run, roles, (times, force), setup.stand, rate=rate, seed=setup.conditions.seed,
+            sensors=setup.sensors,
+        )  # fmt: skip
         out.append((log.with_meta(**_meta(setup, run)), run))
     return out
 

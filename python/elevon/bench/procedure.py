@@ -243,6 +243,36 @@ class SettingsStep(_Frozen):
     parameters: dict[str, Quantity]
 
 
+class SensorStep(_Frozen):
+    """Let a sensor of the stand fail in the logs that follow: none of the actuator's own.
+
+    Attributes
+    ----------
+    channel : str
+        Role that the stand records, such as ``load_cell`` or ``surface_temperature``.
+    gain : float
+        Factor on what it measures.
+    offset : quantity
+        Added to it, in the channel's unit.
+    fault : str
+        ``stuck``: what it measured last; ``dead``: nothing but the recorder's noise.
+    at : quantity
+        When it becomes so, s from the log's beginning.
+    """
+
+    kind: Literal["sensor"]
+    channel: StrictStr
+    gain: StrictInt | StrictFloat = 1.0
+    offset: Quantity = 0.0
+    fault: Literal["none", "stuck", "dead"] = "none"
+    at: Quantity = 0.0
+
+    @field_validator("at")
+    @classmethod
+    def _later(cls, value: Quantity) -> Quantity:
+        return _checked(value, "s", 0.0, "at")
+
+
 class TraceStep(_Frozen):
     """Record one log.
 
@@ -288,7 +318,7 @@ class TraceStep(_Frozen):
 
 _Load = BacklashStep | BrakeStep | SpringStep | WeightsStep | ForceStep | RigStep
 Step = Annotated[
-    _Load | SettingsStep | TraceStep,
+    _Load | SettingsStep | SensorStep | TraceStep,
     Field(discriminator="kind"),
 ]
 

@@ -15,6 +15,7 @@ from elevon.diagnose.engine.reading import ReplayUnit
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 from elevon.diagnose.positions.reading import PositionReading
 from elevon.diagnose.roles.log import role_log
+from elevon.diagnose.stand_sensors import diagnose_sensors
 from elevon.diagnose.vibration.answer import diagnose_spall
 from elevon.diagnose.vibration.reading import KIND, shows_passes
 from elevon.errors import InputError
@@ -74,6 +75,9 @@ def diagnose(
     """
     begin = clock.perf_counter()
     check_request(logs, false_alarm)
+    broken = diagnose_sensors(logs, baselines, false_alarm) if faults is None else None
+    if broken is not None:
+        return replace(broken, seconds=clock.perf_counter() - begin)
     heard, notes = _heard(logs, actuator, faults, false_alarm, alone=not baselines)
     if heard is not None:
         return replace(heard, seconds=clock.perf_counter() - begin)

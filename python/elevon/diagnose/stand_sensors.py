@@ -1,0 +1,249 @@
+"""Sensors of the stand that contradict what stands beside them: of force, heat, vibration.
+
+A fault of the actuator moves what the actuator does; it does not change what two sensors of one
+quantity say of each other. So the load cell is held against the stand's own force, a thermocouple
+against the other one and against what silicon and copper can be, an accelerometer against its own
+recorder. Each number has its healthy unit in the baselines of the same test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.arrays import Floats
+from elevon.diagnose.engine.answer import (
+    Cause,
+    Diagnosis,
+    Explanation,
+    FaultPlace,
+    SuspectedFault,
+)
+
+if TYPE_CHECKING:
+    from elevon.logs.log import Log
+
+PLACE = "stand"
+GAIN = 0.01
+"""Least change of a load cell's gain that is told; ASSUMED: the class of a cell in use."""
+FORCE = 0.005
+"""The same of its offset, over the force's size."""
+KELVIN = 3.0
+"""The same of a thermocouple's offset [K]: class 2 of type K is 2.5 K; ASSUMED."""
+RANGE = (200.0, 500.0)
+"""K beyond which a thermocouple on a motor says nothing of the motor."""
+_DEVIATIONS = 4.0
+_BLOCKS = 12  # stretches from which a regression's deviation is taken
+_FLAT = 0.2  # of the baseline's noise: below it a channel does not move
+_SURE = 0.999
+"""Probability given to a contradiction of four deviations or more; ASSUMED."""
+_ISOLATED = (
+    "a sensor of the stand contradicts another one of it, which no fault of the actuator does: "
+    "mend it before the actuator is diagnosed"
+)
+_THERMOCOUPLES = ("surface_temperature", "nut_temperature")
+
+
+@dataclass(frozen=True)
+class SensorSuspect:
+    """A sensor of the stand that contradicts the others.
+
+    Attributes
+    ----------
+    kind, channel : str
+        ``gain``, ``offset``, ``stuck`` or ``dead``; role.
+    size : float
+        Share of the gain, or offset in the channel's unit; 1 of what is there or not.
+    interval : (float, float)
+        Of 90 %.
+    unit : str
+        Of the size.
+    or_else : str
+        The role that says the same with the other sign; empty: it is this one.
+    """
+
+    kind: str
+    channel: str
+    size: float
+    interval: tuple[float, float]
+    unit: str
+    or_else: str = ""
+
+    @property
+    def key(self) -> str:
+        """``KIND@stand.CHANNEL``."""
+        return f"{self.kind}@{PLACE}.{self.channel}"
+
+
+def suspects_of(log: Log, baselines: Sequence[Log]) -> list[SensorSuspect]:
+    """Return the stand's sensors that contradict the others in a log, against healthy ones.
+
+    Parameters
+    ----------
+    log : Log
+        Of the unit.
+    baselines : sequence of Log
+        Of the same test on a healthy unit and stand.
+    """
+    healthy = [item for item in baselines if item.has(*_present(log))]
+    if not healthy:
+        return []
+    tests: tuple[Callable[[Log, Sequence[Log]], list[SensorSuspect]], ...] = (
+        _silent, _load_cell, _thermocouples,
+    )  # fmt: skip
+    for test in tests:
+        suspects = test(log, healthy)
+        if suspects:
+            return suspects
+    return []
+
+
+def _present(log: Log) -> list[str]:
+    return [role for role in ("load_cell", "load", *_THERMOCOUPLES, "vibration") if log.has(role)]
+
+
+def _roughness(values: Floats) -> float:
+    """Return the size of what changes from sample to sample."""
+    return float(np.median(np.abs(np.diff(values))))
+
+
+def _silent(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
+    """Return channels that do not move although the baseline's do, or that cannot be."""
+    suspects = []
+    for role in _present(log):
+        if role == "load":
+            continue
+        values = log[role]
+        usual = min(float(np.std(item[role])) for item in healthy)
+        noise = min(_roughness(item[role]) for item in healthy)
+        level = float(np.median(values))
+        if role in _THERMOCOUPLES and not RANGE[0] < level < RANGE[1]:
+            suspects.append(SensorSuspect("dead", role, 1.0, (1.0, 1.0), "1"))
+        elif usual > 5.0 * noise and float(np.std(values)) < _FLAT * usual:
+            kind = "dead" if abs(level) < 3.0 * noise else "stuck"
+            suspects.append(SensorSuspect(kind, role, 1.0, (1.0, 1.0), "1"))
+    return suspects
+
+
+def _load_cell(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
+    """Regress the cell on the stand's force, inertia and friction of the load side."""
+    if not log.has("load_cell", "load", "motor_speed"):
+        return []
+    own, spread = _regression(log)
+    others = np.array([_regression(item)[0] for item in healthy])
+    usual = others.mean(axis=0)
+    deviation = np.hypot(spread, np.std(others, axis=0))
+    gain, offset = own[0] / usual[0] - 1.0, own[1] - usual[1]
+    error = deviation[0] / usual[0]
+    size = float(np.sqrt(np.mean(log["load"] ** 2)))
+    if abs(gain) > max(GAIN, _DEVIATIONS * error):
+        interval = (float(gain - 1.645 * error), float(gain + 1.645 * error))
+        cell, force = (_torque_moved(log, healthy, role) for role in ("load_cell", "load"))
+        if cell < 0.5 * abs(gain) < force:  # the motor agrees with the cell
+            size = 1.0 / (1.0 + float(gain)) - 1.0
+            width = 1.645 * float(error)
+            return [SensorSuspect("gain", "load", size, (size - width, size + width), "1")]
+        sure = force < 0.5 * abs(gain) < cell
+        other = "" if sure else "load"
+        return [SensorSuspect("gain", "load_cell", float(gain), interval, "1", other)]
+    if abs(offset) > max(FORCE * size, _DEVIATIONS * deviation[1]):
+        interval = (float(offset - 1.645 * deviation[1]), float(offset + 1.645 * deviation[1]))
+        return [SensorSuspect("offset", "load_cell", float(offset), interval, "N", "load")]
+    return []
+
+
+def _torque_moved(log: Log, healthy: Sequence[Log], role: str) -> float:
+    """Return by what share the motor's current a force has changed; infinite without current."""
+    if not log.has("torque_current"):
+        return float("inf")
+    slopes = [np.polyfit(item[role], item["torque_current"], 1)[0] for item in (log, *healthy)]
+    usual = float(np.mean(slopes[1:]))
+    return abs(float(slopes[0]) / usual - 1.0) if usual != 0.0 else float("inf")
+
+
+def _regression(log: Log) -> tuple[Floats, Floats]:
+    """Return gain, offset and what the load side adds, and their deviations over stretches."""
+    speed = log["motor_speed"]
+    design = np.column_stack(
+        [log["load"], np.ones(len(speed)), np.gradient(speed, log.time),
+         np.tanh(speed / max(0.05 * float(np.abs(speed).max()), 1e-9))]
+    )  # fmt: skip
+    scale = np.abs(design).max(axis=0) + 1e-12
+    whole = np.linalg.lstsq(design / scale, log["load_cell"], rcond=None)[0] / scale
+    left = log["load_cell"] - design @ whole
+    inverse = np.linalg.pinv((design / scale).T @ (design / scale))
+    parts = np.array_split(np.arange(len(speed)), _BLOCKS)
+    scores = np.array([(design[p] / scale).T @ left[p] for p in parts])
+    spread = np.sqrt(np.diag(inverse @ (scores.T @ scores) @ inverse)) / scale
+    return whole, spread
+
+
+def _thermocouples(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
+    """Compare both at the log's beginning, where a stand that has rested is as warm as its air."""
+    if not log.has(*_THERMOCOUPLES):
+        return []
+    first = {role: _begin(log, role) for role in _THERMOCOUPLES}
+    usual = {role: np.array([_begin(item, role) for item in healthy]) for role in _THERMOCOUPLES}
+    apart = first[_THERMOCOUPLES[0]] - first[_THERMOCOUPLES[1]]
+    before = usual[_THERMOCOUPLES[0]] - usual[_THERMOCOUPLES[1]]
+    offset = float(apart - before.mean())
+    if abs(offset) < KELVIN:
+        return []
+    # The one that left what both were before; of a warmer day both do.
+    moved = [abs(first[role] - float(usual[role].mean())) for role in _THERMOCOUPLES]
+    at = int(np.argmax(moved))
+    role, other = _THERMOCOUPLES[at], _THERMOCOUPLES[1 - at]
+    sure = min(moved) < 0.5 * KELVIN
+    size = offset if at == 0 else -offset
+    error = float(np.hypot(0.1, np.std(before)))
+    interval = (size - 1.645 * error, size + 1.645 * error)
+    return [SensorSuspect("offset", role, size, interval, "K", "" if sure else other)]
+
+
+def _begin(log: Log, role: str) -> float:
+    return float(np.median(log[role][: max(10, len(log.time) // 50)]))
+
+
+def diagnose_sensors(
+    logs: Sequence[Log], baselines: Sequence[Log], rate: float
+) -> Diagnosis | None:
+    """Return the answer where a sensor of the stand contradicts the others, else None.
+
+    Parameters
+    ----------
+    logs, baselines : sequence of Log
+        Of the unit; of a healthy unit in the same test.
+    rate : float
+        Of false alarms that was asked for; the thresholds here are far beyond it.
+    """
+    suspects = {item.key: item for log in logs for item in suspects_of(log, baselines)}
+    if not suspects:
+        return None
+    causes = tuple(_cause(item) for item in suspects.values())
+    named = tuple(SuspectedFault(c.kind, c.place, c.severity, c.unit, c.interval) for c in causes)
+    return Diagnosis(
+        logs=tuple(log.name for log in logs),
+        status="faulty",
+        p_fault=_SURE,
+        false_alarm=rate,
+        chance=1.0 - _SURE,
+        faults=causes,
+        best=tuple(suspects),
+        p_best=_SURE,
+        unobservable=(),
+        detectable={},
+        features=(),
+        findings=(_ISOLATED,),
+        seconds=0.0,
+        hypotheses=(Explanation(named, _SURE),),
+        severity_units={cause.key: cause.unit for cause in suspects.values()},
+    )
+
+
+def _cause(item: SensorSuspect) -> Cause:
+    both = (FaultPlace(item.kind, f"{PLACE}.{item.or_else}"),) if item.or_else else ()
+    place = f"{PLACE}.{item.channel}"
+    return Cause(item.kind, place, item.unit, _SURE, item.size, item.interval, both)
