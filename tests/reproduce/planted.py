@@ -260,11 +260,11 @@ def commutation(row=None, pulses=None, **pulse):
 
 def functional(**changes):
     """Return the checks of every condition, but for what is wrong in each."""
-    from elevon.reproduce.pisa_gear import CONDITIONS, FIGURES
+    from elevon.reproduce.pisa_gear import CONDITIONS, FIGURES, TEMPERATURES
 
     return [
         check
-        for condition in (*CONDITIONS[:-1], FIGURES)
+        for condition in (*CONDITIONS[:-1], FIGURES, *TEMPERATURES)
         for check in gear.functional_checks(condition, **changes)
     ]
 
@@ -437,6 +437,7 @@ PLANTED = {
         partial(separation, half=()),
     ("nasa-separation", "gap at * N: impact, *"): partial(separation, impact=0.4),
     ("pisa-functional", "cycle, nominal (*"): partial(functional, extension_s=14.0),
+    ("pisa-functional", "cycle, nominal at *"): partial(functional, extension_s=14.0),
     ("pisa-functional", "cycle, normal (*"): partial(functional, extension_s=14.0),
     ("pisa-functional", "cycle, normal, as Figs. *"): partial(functional, retraction_s=14.0),
     ("pisa-functional", "cycle, critical (*"): partial(functional, extension_s=34.0),

@@ -20,9 +20,9 @@ def test_functional_runs_meet_their_requirements() -> None:
     assert values["status"] == "pass"
     assert [row["condition"] for row in values["rows"]] == [
         "nominal", "normal", "normal", "critical", "critical", "limit",
-        "normal, as Figs. 3.11 to 3.16"]  # fmt: skip
-    assert len(values["checks"]) == 6 + 4 * 6
-    limit, others = values["rows"][5], [*values["rows"][:5], values["rows"][6]]
+        "normal, as Figs. 3.11 to 3.16", "nominal at -40 C", "nominal at 70 C"]  # fmt: skip
+    assert len(values["checks"]) == 8 + 4 * 6
+    limit, others = values["rows"][5], [*values["rows"][:5], *values["rows"][6:]]
     assert limit["passed"] is None
     assert limit["requirement_s"] is None
     # 14 V cannot reach the high speed in retraction: slower than every other condition.

@@ -15,6 +15,7 @@ from elevon.reproduce.pisa_gear import (
     ACTUATOR,
     CONDITIONS,
     FIGURES,
+    TEMPERATURES,
     Condition,
     Stroke,
     run_strokes,
@@ -59,6 +60,7 @@ class FunctionalRow:
             "condition": self.condition.name,
             "nz": self.condition.load_factor,
             "supply_v": self.condition.supply,
+            "temperature_k": self.condition.temperature,
             "extension_s": self.extension_s,
             "retraction_s": self.retraction_s,
             "cycle_s": self.cycle_s,
@@ -104,9 +106,9 @@ def reproduce_functional(
     SimulationError
         A run tripped or diverged.
     """
-    conditions = (*CONDITIONS, FIGURES)
+    conditions = (*CONDITIONS, FIGURES, *TEMPERATURES)
     strokes = [
-        Stroke(action, condition.load_factor, condition.supply)
+        Stroke(action, condition.load_factor, condition.supply, condition.values)
         for condition in conditions
         for action in ("extend", "retract")
     ]

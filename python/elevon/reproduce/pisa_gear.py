@@ -23,6 +23,8 @@ RECORD = (
 )
 
 
+WARMED = ("motor.winding_temperature", "lubricant.temperature")
+"""What a temperature of the surroundings reaches."""
 RELAXED = 40.0
 """Cycle that P allows in the critical condition [s]: twice that of the others."""
 
@@ -39,17 +41,31 @@ class Condition:
         N_z and V.
     requirement : float or None
         Cycle allowed [s].
+    temperature : float or None
+        Of winding and lubricant [K]; None: the actuator file's.
     """
 
     name: str
     load_factor: float
     supply: float
     requirement: float | None
+    temperature: float | None = None
+
+    @property
+    def values(self) -> dict[str, float | str]:
+        """Parameters that the condition sets beside load factor and supply."""
+        if self.temperature is None:
+            return {}
+        return dict.fromkeys(WARMED, self.temperature)
 
     @property
     def constant_speed(self) -> bool:
-        """Whether the set points are to be held: where P doubles the cycle, it lets them go."""
-        return self.requirement is not None and self.requirement < RELAXED
+        """Whether the set points are to be held.
+
+        Where P doubles the cycle, it lets them go; of temperature it requires nothing.
+        """
+        required = self.requirement is not None and self.requirement < RELAXED
+        return required and self.temperature is None
 
 
 CONDITIONS = (
@@ -62,6 +78,12 @@ CONDITIONS = (
 )
 FIGURES = Condition("normal, as Figs. 3.11 to 3.16", 1.0, 22.0, 20.0)
 """What P 3.3.1 says of its own figures; Table 1.2, the abstract and 3.1 have 1.5 g at 22 V."""
+TEMPERATURES = (
+    Condition("nominal at -40 C", 1.0, 28.0, 20.0, 233.15),
+    Condition("nominal at 70 C", 1.0, 28.0, 20.0, 343.15),
+)
+"""P names temperature among what defines a condition and leaves it out; the ends are ASSUMED
+(DO-160, equipment outside the cabin), and so is what they do to the lubricant."""
 
 
 @dataclass(frozen=True, slots=True)

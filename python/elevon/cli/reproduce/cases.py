@@ -259,7 +259,7 @@ CASES = (
     PublishedCase(
         "pisa-functional",
         "Extend and retract the landing gear in every condition of the thesis.",
-        "simulating 14 strokes",
+        "simulating 18 strokes",
         _R + "pisa_functional:reproduce_functional",
         ("condition", "nz", "supply_v", "extension_s", "retraction_s", "cycle_s",
          "extension_high_rad_s", "extension_low_rad_s", "retraction_high_rad_s",
