@@ -99,6 +99,17 @@ def test_without_baselines_nothing_is_said():
     assert suspects_of(log_of(5, {"channel": "load_cell", "gain": 0.5}), ()) == []
 
 
+def test_a_cell_that_measures_something_else_is_no_witness():
+    """The landing gear's cell is its friction rig's: nothing is said of it."""
+    rng = np.random.default_rng(3)
+
+    def other(log):
+        return log.with_channels(load_cell=5.0 * rng.standard_normal(len(log.time)))
+
+    base = [other(log) for log in healthy()]
+    assert suspects_of(other(log_of(5)), base) == []
+
+
 def test_a_channel_that_the_stand_has_not_is_refused():
     with pytest.raises(InputError, match="load_cell"):
         log_of(1, {"channel": "loadcell"})

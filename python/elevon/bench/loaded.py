@@ -160,8 +160,8 @@ def _rated(
     if force is None or step.command.mode != "position" or not np.isfinite(most):
         return 1.0
     times = np.arange(0.0, parse_quantity(step.duration, "s", "duration"), 10.0 * _GRID)
-    terms = _values(force.terms, times, conditions.start)
-    return rated_factor(force, terms, _values(step.command.terms, times, 0.0, "m"), most)
+    terms = waveform_values(force.terms, times, conditions.start)
+    return rated_factor(force, terms, waveform_values(step.command.terms, times, 0.0, "m"), most)
 
 
 def _scenario(
@@ -188,7 +188,7 @@ def _begin(step: TraceStep, actuator: Actuator, start: float) -> dict[str, Any]:
     known = actuator.parameters
     if step.command.mode != "position" or "screw.lead" not in known:
         return {}
-    at = float(_values(step.command.terms, np.zeros(1), start, "m")[0])
+    at = float(waveform_values(step.command.terms, np.zeros(1), start, "m")[0])
     turned = at * known.value("gear.ratio") / known.value("screw.lead")
     return {} if at == 0.0 else {"motor_position": turned, "output_position": at}
 
@@ -327,13 +327,15 @@ def _force(setup: LoadedSetup, run: Recording, times: Floats) -> Floats:
     position, speed = (
         np.interp(times, clock, run[name].values) for name in ("output_position", "output_speed")
     )
-    terms = _values(setup.force.terms, times, setup.conditions.start)
+    terms = waveform_values(setup.force.terms, times, setup.conditions.start)
     force_step = setup.factor * target_force(setup.force, terms, position, speed)
     return ForceLoop.of(setup.stand.force).achieved(times, force_step, speed)
 
 
-def _values(terms: Sequence[Term], times: Floats, start: float, unit: str = "N") -> Floats:
-    """Return the sum of waveforms at instants."""
+def waveform_values(
+    terms: Sequence[Term], times: Floats, start: float = 0.0, unit: str = "N"
+) -> Floats:
+    """Return the sum of waveforms at instants, shape of `times`, begun at `start` [s]."""
     from elevon import _core
     from elevon.scenario.compile import compile_term
 

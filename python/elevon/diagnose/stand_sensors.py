@@ -36,6 +36,7 @@ KELVIN = 3.0
 RANGE = (200.0, 500.0)
 """K beyond which a thermocouple on a motor says nothing of the motor."""
 _DEVIATIONS = 4.0
+_FOLLOWS = 0.2  # of a force's spread: what the cell of a healthy stand may miss it by
 _BLOCKS = 12  # stretches from which a regression's deviation is taken
 _FLAT = 0.2  # of the baseline's noise: below it a channel does not move
 _SURE = 0.999
@@ -88,7 +89,7 @@ def suspects_of(log: Log, baselines: Sequence[Log]) -> list[SensorSuspect]:
     baselines : sequence of Log
         Of the same test on a healthy unit and stand.
     """
-    healthy = [item for item in baselines if item.has(*_present(log))]
+    healthy = [item for item in baselines if item.has(*_present(log)) and _witnessed(item)]
     if not healthy:
         return []
     tests: tuple[Callable[[Log, Sequence[Log]], list[SensorSuspect]], ...] = (
@@ -103,6 +104,20 @@ def suspects_of(log: Log, baselines: Sequence[Log]) -> list[SensorSuspect]:
 
 def _present(log: Log) -> list[str]:
     return [role for role in ("load_cell", "load", *_THERMOCOUPLES, "vibration") if log.has(role)]
+
+
+def _witnessed(log: Log) -> bool:
+    """Tell whether a log's load cell follows the stand's force; without a cell there is no doubt.
+
+    A cell that measures something else, such as a friction rig's, has no witness here.
+    """
+    if not log.has("load_cell"):
+        return True
+    if not log.has("load", "motor_speed"):
+        return False
+    (gain, *_), _ = _regression(log)
+    off = float(np.std(log["load_cell"] - gain * log["load"]))
+    return 0.5 < gain < 2.0 and off < _FOLLOWS * float(np.std(log["load"]))
 
 
 def _roughness(values: Floats) -> float:
