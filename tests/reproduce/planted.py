@@ -118,6 +118,13 @@ def figures_and_seeding():
     return [*drawn_figures(), *seeding()]
 
 
+def flown(excess=0.2, floor=(0.01, -0.01, 0.005), missing=0.03):
+    """Return the checks of a flight, but for what is wrong."""
+    from elevon.reproduce.nasa.flight import checks_of
+
+    return checks_of(excess, np.array(floor), missing)
+
+
 def first_row(**changes):
     """Return a change of the first row."""
     return lambda rows: [replace(rows[0], **changes), *rows[1:]]
@@ -300,6 +307,7 @@ GOOD = {
     "torino-loaded": campaign,
     "nasa-current": current,
     "nasa-faults": figures_and_seeding,
+    "nasa-flight": flown,
     "nasa-thermal": partial(with_error, "nasa-thermal"),
     "nasa-baseline": baseline,
     "nasa-separation": separation,
@@ -394,6 +402,11 @@ PLANTED = {
         partial(seeding, turns=lambda _speed: 1.0),
     ("nasa-faults", "least rise of the current from level to level"):
         partial(seeding, first_row(resistor_a=0.2)),
+    ("nasa-flight", "load of both rams less the flight's, over its RMS"):
+        partial(flown, missing=0.2),
+    ("nasa-flight", "faulty over nominal: current of a newton"): partial(flown, excess=0.02),
+    ("nasa-flight", "healthy pairs: largest difference of the same"):
+        partial(flown, floor=(0.12, 0.0, 0.0)),
     ("nasa-thermal", "steady state less the algebraic root"):
         _T((THERMAL + "steady_state", given(lambda actuator: actuator.with_values(
             {"thermal.convection": 1.1 * actuator.parameters.value("thermal.convection")})))),

@@ -39,7 +39,7 @@ _DEVIATIONS = 4.0
 _FOLLOWS = 0.2  # of a force's spread: what the cell of a healthy stand may miss it by
 _BLOCKS = 12  # stretches from which a regression's deviation is taken
 _FLAT = 0.2  # of the baseline's noise: below it a channel does not move
-_SURE = 0.999
+_PROBABILITY = 0.999
 """Probability given to a contradiction of four deviations or more; ASSUMED."""
 _ISOLATED = (
     "a sensor of the stand contradicts another one of it, which no fault of the actuator does: "
@@ -147,11 +147,11 @@ def _load_cell(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
     """Regress the cell on the stand's force, inertia and friction of the load side."""
     if not log.has("load_cell", "load", "motor_speed"):
         return []
-    own, spread = _regression(log)
+    here, spread = _regression(log)
     others = np.array([_regression(item)[0] for item in healthy])
     usual = others.mean(axis=0)
     deviation = np.hypot(spread, np.std(others, axis=0))
-    gain, offset = own[0] / usual[0] - 1.0, own[1] - usual[1]
+    gain, offset = here[0] / usual[0] - 1.0, here[1] - usual[1]
     error = deviation[0] / usual[0]
     size = float(np.sqrt(np.mean(log["load"] ** 2)))
     if abs(gain) > max(GAIN, _DEVIATIONS * error):
@@ -161,8 +161,8 @@ def _load_cell(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
             size = 1.0 / (1.0 + float(gain)) - 1.0
             width = 1.645 * float(error)
             return [SensorSuspect("gain", "load", size, (size - width, size + width), "1")]
-        sure = force < 0.5 * abs(gain) < cell
-        other = "" if sure else "load"
+        alone = force < 0.5 * abs(gain) < cell
+        other = "" if alone else "load"
         return [SensorSuspect("gain", "load_cell", float(gain), interval, "1", other)]
     if abs(offset) > max(FORCE * size, _DEVIATIONS * deviation[1]):
         interval = (float(offset - 1.645 * deviation[1]), float(offset + 1.645 * deviation[1]))
@@ -211,11 +211,11 @@ def _thermocouples(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
     moved = [abs(first[role] - float(usual[role].mean())) for role in _THERMOCOUPLES]
     at = int(np.argmax(moved))
     role, other = _THERMOCOUPLES[at], _THERMOCOUPLES[1 - at]
-    sure = min(moved) < 0.5 * KELVIN
+    alone = min(moved) < 0.5 * KELVIN
     size = offset if at == 0 else -offset
     error = float(np.hypot(0.1, np.std(before)))
     interval = (size - 1.645 * error, size + 1.645 * error)
-    return [SensorSuspect("offset", role, size, interval, "K", "" if sure else other)]
+    return [SensorSuspect("offset", role, size, interval, "K", "" if alone else other)]
 
 
 def _begin(log: Log, role: str) -> float:
@@ -242,18 +242,18 @@ def diagnose_sensors(
     return Diagnosis(
         logs=tuple(log.name for log in logs),
         status="faulty",
-        p_fault=_SURE,
+        p_fault=_PROBABILITY,
         false_alarm=rate,
-        chance=1.0 - _SURE,
+        chance=1.0 - _PROBABILITY,
         faults=causes,
         best=tuple(suspects),
-        p_best=_SURE,
+        p_best=_PROBABILITY,
         unobservable=(),
         detectable={},
         features=(),
         findings=(_ISOLATED,),
         seconds=0.0,
-        hypotheses=(Explanation(named, _SURE),),
+        hypotheses=(Explanation(named, _PROBABILITY),),
         severity_units={cause.key: cause.unit for cause in suspects.values()},
     )
 
@@ -261,4 +261,4 @@ def diagnose_sensors(
 def _cause(item: SensorSuspect) -> Cause:
     both = (FaultPlace(item.kind, f"{PLACE}.{item.or_else}"),) if item.or_else else ()
     place = f"{PLACE}.{item.channel}"
-    return Cause(item.kind, place, item.unit, _SURE, item.size, item.interval, both)
+    return Cause(item.kind, place, item.unit, _PROBABILITY, item.size, item.interval, both)

@@ -227,6 +227,16 @@ CASES = (
         page=_R + "nasa.page_figures:faults_report",
     ),
     PublishedCase(
+        "nasa-flight",
+        "Fly the planned stand: a nominal and a faulty actuator, the load switched between them.",
+        "flying four pairs of actuators",
+        _R + "nasa.flight:reproduce_flight",
+        ("unit", "begin_s", "load_n", "current_a", "tracking_mm", "current_per_load_a"),
+        "stretches between two switchings of the load",
+        page=_R + "nasa.page_flight:flight_report",
+        options={"fidelity": (_STAND, "low")},
+    ),
+    PublishedCase(
         "nasa-thermal",
         "Heat the ballscrew actuator's motor for an hour, held to closed forms.",
         "simulating nine hours at low fidelity",
