@@ -44,7 +44,7 @@ def test_load_factor_vibration_and_air_reach_both():
         assert np.std(more) > 2.0 * mass
     time = np.arange(0.0, 4.0, 1.0)
     (air,) = flyable._scenario(flight(), time, np.zeros(4), conditions).ambient.terms
-    assert air.arguments["values"] == pytest.approx([288.15, 268.65])
+    assert air.values == pytest.approx([288.15, 268.65])
 
 
 def test_a_faulty_actuator_needs_more_current_under_the_same_load():
