@@ -134,9 +134,9 @@ def test_profiles_are_the_benchs_and_variants():
 def test_a_file_that_is_no_result(tmp_path):
     unknown = {**RESULT, "hypotheses": [_set(1.0, ("rust@gear", 0.1, [0.0, 0.2]))]}
     texts = {
-        "": "Expecting",
-        "{}": "no 'hypotheses'",
-        "[1]": "indices",
+        "": "not JSON",
+        "{}": "'hypotheses' is missing",
+        "[1]": "not one JSON object",
         json.dumps(unknown): "rust",
     }
     for text, why in texts.items():
@@ -199,7 +199,7 @@ def test_every_test_of_a_stand_is_ranked(name):
 
 
 def test_a_diagnosis_without_hypotheses_is_no_result():
-    with pytest.raises(FormatError, match=r"the diagnosis: .* no 'hypotheses'"):
+    with pytest.raises(FormatError, match=r"the diagnosis: .* 'hypotheses' is missing"):
         elevon.next_test("torino-rotary", [{"status": "faulty", "faults": []}])
 
 

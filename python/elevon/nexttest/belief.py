@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.diagnose.engine.answer import Explanation
 from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
 from elevon.diagnose.engine.posterior import PRIOR_FAULTY, SECOND
 from elevon.errors import FormatError, InputError
-from elevon.files import read_regular
+from elevon.plain import REMAINDER, Plain
+from elevon.results import read_json
 
-_LONGEST = 2**24  # bytes of a result; it has some ten thousand
 _LEAST = 1e-4  # weight that all sets have together that a result does not list
 _SMALL = 0.1  # root of the least severity over the greatest, where nothing is known of it
 _NINETY = 3.29  # deviations in a Gaussian's interval of 90 %
@@ -104,7 +104,7 @@ class Belief:
     @classmethod
     def after(
         cls,
-        results: Sequence[Mapping[str, Any]],
+        results: Sequence[Mapping[str, object]],
         candidates: Sequence[CandidateFault] = CANDIDATES,
     ) -> Belief:
         """Return what is believed after diagnoses (`elevon diagnose --json`) of different logs.
@@ -163,17 +163,37 @@ def read_result(
     FormatError
         No such file, no JSON, or no diagnosis of such an actuator.
     """
-    given = isinstance(result, Mapping)
+    data = result if isinstance(result, Mapping) else read_json(result)
     try:
-        data = result if isinstance(result, Mapping) else json.loads(read_regular(result, _LONGEST))
         Answered.of(data, candidates)
-    except (OSError, ValueError, LookupError, TypeError, RecursionError, OverflowError) as error:
-        why = f"no {error}" if isinstance(error, KeyError) else str(error)
-        place = "the diagnosis" if given else f"{result}"
+    except FormatError as error:
+        place = "the diagnosis" if isinstance(result, Mapping) else f"{result}"
         raise FormatError(
-            f"{place}: not a result of elevon diagnose --json of this actuator: {why}"
+            f"{place}: not a result of elevon diagnose --json of this actuator: {error}"
         ) from error
     return dict(data)
+
+
+@dataclass(frozen=True)
+class OpenQuestion(Plain):
+    """What of a diagnosis' JSON is read here.
+
+    Attributes
+    ----------
+    hypotheses : tuple of Explanation
+        The sets of faults that it lists.
+    detectable : dict of str to float
+        The faults that it scored.
+    method : str
+        By which it was made.
+    others : dict
+        All else.
+    """
+
+    hypotheses: tuple[Explanation, ...]
+    detectable: dict[str, float]
+    method: str = "model"
+    others: Annotated[dict[str, Any], REMAINDER] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -199,15 +219,15 @@ class Answered:
 
     @classmethod
     def of(
-        cls, result: Mapping[str, Any], candidates: Sequence[CandidateFault] = CANDIDATES
+        cls, result: Mapping[str, object], candidates: Sequence[CandidateFault] = CANDIDATES
     ) -> Answered:
-        """Read a result."""
-        keys = [c.key for c in candidates]
-        possible = {one.keys: one for one in (_possible(h, keys) for h in result["hypotheses"])}
-        seen = {*result["detectable"], *chain.from_iterable(possible)}
+        """Read a result; raise `FormatError` where it is none."""
+        known, read = [c.key for c in candidates], OpenQuestion.from_dict(result, "result")
+        possible = {one.keys: one for one in (_possible(h, known) for h in read.hypotheses)}
+        seen = {*read.detectable, *chain.from_iterable(possible)}
         candidates = [c for c in candidates if c.key in seen]
         prior = {p.keys: p.weight for p in Belief.prior(candidates).possible}
-        if result.get("method") == "surrogate":
+        if read.method == "surrogate":
             prior = {keys: _trained(len(keys)) for keys in prior}
         remaining = max(1.0 - sum(p.weight for p in possible.values()), _LEAST)
         return cls(possible, remaining, frozenset(c.key for c in candidates), prior)
@@ -230,17 +250,18 @@ def _trained(count: int) -> float:
     return faulty * share + (0.0 if count else 1.0 - faulty)
 
 
-def _possible(item: Mapping[str, Any], known: Sequence[str]) -> Possible:
+def _possible(item: Explanation, known: Sequence[str]) -> Possible:
     """Return one listed set; its keys in the order of the candidates."""
-    rows = {f"{f['kind']}@{f['place']}": f for f in item["faults"]}
+    rows = {f"{fault.kind}@{fault.place}": fault for fault in item.faults}
     if not rows.keys() <= set(known):
-        raise ValueError(f"{', '.join(sorted(rows.keys() - set(known)))} is no candidate")
+        raise FormatError(f"{', '.join(sorted(rows.keys() - set(known)))} is no candidate")
     keys = tuple(sorted(rows, key=known.index))
-    centre = tuple(float(rows[k]["severity"]) for k in keys)
-    deviation = tuple(_deviation(rows[k]) for k in keys)
-    return Possible(keys, float(item["probability"]), centre, deviation)
+    centre = tuple(rows[key].severity for key in keys)
+    deviation = tuple(_deviation(*rows[key].interval) for key in keys)
+    if not all(map(math.isfinite, (item.probability, *centre, *deviation))):
+        raise FormatError(f"{', '.join(keys) or 'healthy'}: a number is missing")
+    return Possible(keys, item.probability, centre, deviation)
 
 
-def _deviation(fault: Mapping[str, Any]) -> float:
-    low, high = fault["interval"]
-    return max(float(high) - float(low), 1e-9) / _NINETY
+def _deviation(low: float, high: float) -> float:
+    return max(high - low, 1e-9) / _NINETY
