@@ -109,7 +109,9 @@ def position_loop(ctx: Context) -> None:
         bend = np.gradient(ahead, log.period)
         # A corner of the command lies between two samples.
         used &= np.abs(bend) < 10.0 * (np.median(np.abs(bend)) + 1.0)
-        columns = [error, ahead, bend, np.ones(len(error))]
+        # A position read earlier than it is recorded adds what the error has changed by since.
+        rate = np.gradient(error, log.period)
+        columns = [error, ahead, bend, rate, np.ones(len(error))]
         rows.append(np.stack(columns, axis=1)[used])
         data.append(log["speed_ref"][used])
         strokes.append((log.time[used], log["motor_speed"][used], log.period))
@@ -117,7 +119,7 @@ def position_loop(ctx: Context) -> None:
         why = "needs the command, the motor's position and the set point of the speed"
         ctx.add({}, dict.fromkeys(paths, why))
         return
-    fit = regressed(("gain", "ahead", "bend", "offset"), rows, data, strokes)
+    fit = regressed(("gain", "ahead", "bend", "rate", "offset"), rows, data, strokes)
     # A command read a tick earlier or later than it is recorded moves the error.
     late = value("control.sample_time") * fit["gain"] * abs(1.0 - fit["ahead"])
     levels = {
@@ -154,8 +156,18 @@ def speed_control(ctx: Context) -> None:
     elif not (fit["gain"] > 0.0 and fit["integral"] > 0.0):
         ctx.add({}, dict.fromkeys(paths, "the set point does not follow the speed's error"))
     else:
-        gain, zero = _gain_and_zero(fit)
-        ctx.add({paths[0]: gain, paths[1]: zero.inverted()})
+        # A speed read late by d integrates to d less: what is left of its gain is K (1 - z d), that
+        # of the set point, which the unit computes itself, is K.
+        gain, zero = fit.of(lambda b: float(b[0] + b[2])), fit.of(_zero)
+        # Whether set points are recorded before or after their tick is open.
+        late = abs(fit["integral"]) * value("control.sample_time")
+        zero = zero.widened(late * zero.value / gain.value)
+        ctx.add({paths[0]: gain.widened(late), paths[1]: zero.inverted()})
+
+
+def _zero(fitted: Floats) -> float:
+    """Return one over the integral time, of the coefficients of a speed loop."""
+    return float(fitted[1] / (fitted[0] + fitted[2]))
 
 
 def unit_gains(ctx: Context) -> None:
