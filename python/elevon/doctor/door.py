@@ -16,6 +16,7 @@ from elevon.doctor.data import checks_of, columns_of
 from elevon.errors import InputError
 from elevon.logs.foreign import ForeignLog, import_foreign
 from elevon.logs.log import Log
+from elevon.logs.maps.column_map import ColumnMap, find_map
 from elevon.logs.maps.guess_write import guess_text
 from elevon.logs.read import named_apart
 from elevon.progress import Progress, part
@@ -23,7 +24,6 @@ from elevon.simulate.arguments import as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.logs.maps.column_map import ColumnMap
     from elevon.simulate.arguments import ActuatorLike
 
 PathLike = str | os.PathLike[str]
@@ -35,7 +35,7 @@ def doctor(
     actuator: ActuatorLike,
     baselines: PathLike | Sequence[PathLike] = (),
     *,
-    map: ColumnMap | PathLike | None = None,  # noqa: A002 - the option's name
+    map: ColumnMap | str | Path | None = None,  # noqa: A002 - the option's name
     loadcells: Sequence[PathLike | None] = (),
     notes: Sequence[PathLike | None] = (),
     false_alarm: float = 0.05,
@@ -74,7 +74,8 @@ def doctor(
     given, healthy = _paths(logs), _paths(baselines)
     if not given:
         raise InputError("doctor: needs at least one log")
-    read = _read([*given, *healthy], map, loadcells, notes)
+    column_map = find_map(map) if isinstance(map, (str, Path)) else map
+    read = _read([*given, *healthy], column_map, loadcells, notes)
     named = named_apart([item.imported for item in read])
     unit, reference = named[: len(given)], named[len(given) :]
     reasons: dict[str, str] = {}
@@ -111,7 +112,7 @@ def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
 
 def _read(
     paths: Sequence[Path],
-    column_map: ColumnMap | PathLike | None,
+    column_map: ColumnMap | None,
     loadcells: Sequence[PathLike | None],
     notes: Sequence[PathLike | None],
 ) -> list[ForeignLog]:
@@ -122,7 +123,7 @@ def _read(
         guessed = next((log.column_map for log in read if log.guess is not None), None)
         sidecars = {"loadcell": _path(cell), "command": _path(note)}
         try:
-            read.append(import_foreign(path, _map(column_map) or guessed, **sidecars))
+            read.append(import_foreign(path, column_map or guessed, **sidecars))
         except InputError as error:
             if column_map is None and guessed is not None:
                 read.append(import_foreign(path, **sidecars))
@@ -135,10 +136,6 @@ def _read(
 
 def _path(given: PathLike | None) -> Path | None:
     return None if given is None else Path(given)
-
-
-def _map(given: ColumnMap | PathLike | None) -> ColumnMap | Path | None:
-    return Path(given) if isinstance(given, (str, os.PathLike)) else given
 
 
 def _fit(
