@@ -42,6 +42,8 @@ pub struct HallState<S> {
     /// The last code that a position has: an edge leads from it to the next such code.
     valid: [S; 3],
     last_edge: S,
+    /// 1 while `last_edge` is no time of an edge: it passed while the sensors showed no position.
+    missed: S,
     speed: S,
     direction: S,
     /// Edges since the start, signed.
@@ -50,7 +52,7 @@ pub struct HallState<S> {
     pub errors: S,
 }
 
-kept!(HallState<f64> as HallState { code, valid, last_edge, speed, direction, count, errors });
+kept!(HallState<f64> as HallState { code, valid, last_edge, missed, speed, direction, count, errors });
 
 const PER_TURN: f64 = 1.0 / std::f64::consts::TAU;
 
@@ -86,7 +88,7 @@ impl<S: Scalar> Hall<S> {
     pub fn start(&self, angle: S) -> HallState<S> {
         let zero = S::zero();
         let code = self.code(angle);
-        HallState { code, valid: code, last_edge: S::splat(-1e9), speed: zero, direction: zero, count: zero, errors: zero }
+        HallState { code, valid: code, last_edge: S::splat(-1e9), missed: zero, speed: zero, direction: zero, count: zero, errors: zero }
     }
 
     /// Takes the code after a step of `dt` that ended at time `t` and at `angle`, having advanced by `advance`.
@@ -101,7 +103,7 @@ impl<S: Scalar> Hall<S> {
 
     /// Two codes are vectors 60 degrees apart when one sector follows the other. A code that no position has (all high, all
     /// low) is an error and no edge: what follows it is compared with the last code before it, and an edge that passed
-    /// meanwhile tells the direction but not when it passed, so the speed stays as it was.
+    /// meanwhile tells the direction but not when it passed, so the speed stays as it was until two more have passed.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     fn edge(&self, s: &mut HallState<S>, code: [S; 3], same: S::Mask, angle: S, advance: S, t: S, dt: S) {
@@ -123,11 +125,14 @@ impl<S: Scalar> Hall<S> {
         let since = (edge - s.last_edge).maximum(S::splat(1e-9));
         let steady = direction.equals(s.direction);
         let measured = S::select(steady, direction * self.pitch / since, zero);
-        s.speed = S::select(step & !blind, measured, s.speed);
+        let timed = step & !blind;
+        s.speed = S::select(timed & s.missed.lt(S::splat(0.5)), measured, s.speed);
         s.direction = S::select(step, direction, s.direction);
         s.count = s.count + S::select(step, direction, zero);
         s.errors = s.errors + S::select(!same & !step & !returned, one, zero);
-        s.last_edge = S::select(!same & valid & !returned, edge, s.last_edge);
+        let passed = !same & valid & !returned;
+        s.last_edge = S::select(passed, edge, s.last_edge);
+        s.missed = S::select(passed, S::select(blind, one, zero), s.missed);
         s.valid = three!(|j| S::select(!same & valid, code[j], s.valid[j]));
         s.code = three!(|j| S::select(same, s.code[j], code[j]));
     }
@@ -145,4 +150,52 @@ impl<S: Scalar> Hall<S> {
 fn vector<S: Scalar>(code: [S; 3]) -> (S, S) {
     let half = S::splat(0.5);
     (code[0] - half * (code[1] + code[2]), S::splat(0.866_025_403_784_438_6) * (code[1] - code[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 1e-6;
+
+    fn sensors(power_off: f64) -> Hall<f64> {
+        let mut raw = [0.0; HallParameter::Timeout as usize + 1];
+        raw[HallParameter::Timeout as usize] = 0.1;
+        raw[HallParameter::PowerOff as usize] = power_off;
+        Hall::derive(&raw, 4.0)
+    }
+
+    /// Largest and last speed over 20 ms, without power while `off` says so; the angle is electrical.
+    fn course(speed: f64, off: impl Fn(f64) -> bool) -> (f64, f64) {
+        let (on, dead) = (sensors(0.0), sensors(1.0));
+        let (mut state, mut most) = (on.start(0.1), 0.0_f64);
+        for k in 1..20_000 {
+            let t = f64::from(k) * DT;
+            let hall = if off(t) { &dead } else { &on };
+            hall.observe(&mut state, 0.1 + 4.0 * speed * t, 4.0 * speed * DT, t, DT);
+            most = most.max(hall.speed(&state, t).abs());
+        }
+        (most, on.speed(&state, 20e-3))
+    }
+
+    #[test]
+    fn speed_is_that_of_the_shaft() {
+        for speed in [200.0, -200.0, 35.0] {
+            let (most, last) = course(speed, |_| false);
+            assert!((most - speed.abs()).abs() < 1e-6 * speed.abs(), "{most} {speed}");
+            assert!((last - speed).abs() < 1e-6 * speed.abs(), "{last} {speed}");
+        }
+    }
+
+    /// An interval that begins at the return of the power is no interval between two edges.
+    #[test]
+    fn a_return_of_the_power_never_shows_more_speed_than_there_is() {
+        for speed in [200.0, -200.0, 150.0] {
+            for width in [0.2e-3, 0.9e-3, 1.7e-3, 3.1e-3] {
+                let (most, last) = course(speed, |t| (t / 4e-3).fract() * 4e-3 < width);
+                assert!(most < 1.001 * speed.abs(), "{most} at {speed}, {width} s off");
+                assert!(speed * last >= 0.0 && last.abs() < 1.001 * speed.abs(), "{last} at {speed}");
+            }
+        }
+    }
 }
