@@ -14,6 +14,7 @@ from elevon.reproduce.nasa.baseline import baseline_matrix
 from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineRow
 from tests.reproduce import test_paper_figures as drawn
 from tests.reproduce import test_pisa_limits as gear
+from tests.reproduce.planted_bench import BENCH_GOOD, BENCH_PLANTED
 from tests.reproduce.planting import given, patched, scaled, with_error
 
 # --- torino-backlash -----------------------------------------------------------------------------
@@ -48,40 +49,6 @@ def wrong_low(signal, factor):
         return wrong
 
     return ("low_fidelity:compare", wrapper)
-
-
-# --- torino-validation ---------------------------------------------------------------------------
-def bench_and_model(backlash=0.3667, growth=1.0, percent=(), **facts):
-    """Return the checks of a model that agrees with the bench, but for what is wrong."""
-    from elevon.reproduce.torino_bench import validation as module
-
-    wrong, rows, places = dict(percent), [], []
-    for number, reading in enumerate(module.READINGS):
-        for signal in module.SHOWS:
-            rms = 1e-3 * growth**number
-            rows.append(
-                module.ValidationRow(reading, signal, rms, wrong.get(signal, 0.2), 1, "rad")
-            )
-        printed = module.PRINTED[reading]
-        good = {"model_lost_deg": printed, "bench_flat_s": 0.3, "model_flat_s": 0.3,
-                "fitted_amplitude_deg": 7.0, "fitted_frequency_hz": 0.2}  # fmt: skip
-        places.append(module.BacklashFacts(reading, printed, printed, **(good | facts)))
-    return module.TorinoValidation(rows, places, backlash, "high", 0, "", [], 0.0045).checks
-
-
-# --- torino-loaded -------------------------------------------------------------------------------
-def campaign(constant=1.4, **wrong):
-    """Return the checks of a campaign on the line, but for one test in which something is wrong."""
-    from elevon.reproduce.torino_bench import loaded as module
-
-    rows = []
-    for net in module.NET:
-        lost = np.degrees(net) + 0.3656
-        for torque in np.linspace(module.LEAST, module.MOST, 10):
-            current = 0.2 + torque / 1.4
-            rows.append(module.LoadedRow(net, torque, torque, current, lost, lost, 0.1))
-    rows[4] = replace(rows[4], **wrong)
-    return module.LoadedCampaign(rows, constant, 0.3656, 0.0045, "low", 0, "").checks
 
 
 # --- nasa-current --------------------------------------------------------------------------------
@@ -299,12 +266,10 @@ def cranfield(alarms=2, **wrong):
 #: Cases whose checks need minutes or seconds of simulation.
 LONG = {"torino-backlash", "low-fidelity", "nasa-thermal", "pisa-friction"}  # fmt: skip
 
-GOOD = {
+GOOD = BENCH_GOOD | {
     "torino-backlash": partial(with_error, "torino-backlash"),
     "torino-compliance": partial(with_error, "torino-compliance", resamples=20),
     "low-fidelity": partial(with_error, "low-fidelity"),
-    "torino-validation": bench_and_model,
-    "torino-loaded": campaign,
     "nasa-current": current,
     "nasa-faults": figures_and_seeding,
     "nasa-flight": flown,
@@ -331,7 +296,7 @@ _B, _C, _T = (
 )
 
 #: Case and check, as `cases.toml` names it, to the checks with an error that this one must see.
-PLANTED = {
+PLANTED = BENCH_PLANTED | {
     ("torino-backlash", "row *: recovered less put in"):
         _B((BACKLASH + "backlash_from_encoder", scaled(1.05, "loop_gain"))),
     ("torino-backlash", "largest: motor minus encoder less put in"):
@@ -355,30 +320,6 @@ PLANTED = {
         _C((COMPLIANCE + "_checks", given(lambda slips: slips[1:], 1))),
     ("low-fidelity", "*: position"): error("low-fidelity", wrong_low("position", 1.02)),
     ("low-fidelity", "*: q current"): error("low-fidelity", wrong_low("q_current", 1.1)),
-    ("torino-validation", "*mm: * position"):
-        partial(bench_and_model, percent={"encoder_position": 1.2}),
-    ("torino-validation", "*mm: motor speed"):
-        partial(bench_and_model, percent={"motor_speed": 2.5}),
-    ("torino-validation", "calibrated backlash less the printed one"):
-        partial(bench_and_model, backlash=0.38),
-    ("torino-validation", "*mm: lost motion of the model less the printed backlash"):
-        partial(bench_and_model, model_lost_deg=0.4),
-    ("torino-validation", "*mm: standstill of model less bench"):
-        partial(bench_and_model, model_flat_s=0.32),
-    ("torino-validation", "*mm: fitted amplitude less the commanded one"):
-        partial(bench_and_model, fitted_amplitude_deg=7.1),
-    ("torino-validation", "*mm: fitted frequency less the commanded one"):
-        partial(bench_and_model, fitted_frequency_hz=0.201),
-    ("torino-validation", "encoder error, largest over least backlash"):
-        partial(bench_and_model, growth=1.5),
-    ("torino-loaded", "brake torque by the cell less its place on the line"):
-        partial(campaign, cell_nm=1.2),
-    ("torino-loaded", "torque an ampere balances, less the calibrated constant"):
-        partial(campaign, constant=1.5),
-    ("torino-loaded", "lost motion of the * beyond 2 % of the backlash"):
-        partial(campaign, model_lost_deg=0.4),
-    ("torino-loaded", "position of model less bench, worst test"):
-        partial(campaign, position_percent=1.5),
     ("nasa-current", "nominal runs"): partial(current, count=31),
     ("nasa-current", "nominal: average error of the current"): partial(current, nominal=10.1),
     ("nasa-current", "jam: average error of the current"): partial(current, jam=10.1),

@@ -14,6 +14,7 @@ from elevon.arrays import Floats
 from elevon.calibrate.kinematics import command_fit
 from elevon.errors import InputError, Interrupted, unknown
 from elevon.experiment import Experiment, Inputs
+from elevon.experiment.inputs import Table
 from elevon.logs.command.known import align_noted
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.drive import drive_log
@@ -280,7 +281,11 @@ def _trace(
 
 
 def bench_experiment(
-    log: Log, actuator: Actuator, fidelity: str, shows: Sequence[str] = tuple(SIGNALS)
+    log: Log,
+    actuator: Actuator,
+    fidelity: str,
+    shows: Sequence[str] = tuple(SIGNALS),
+    loads: Mapping[str, Table] | None = None,
 ) -> tuple[Experiment, str]:
     """Return the test of a log of the rotary bench, and how its command was rebuilt.
 
@@ -294,6 +299,8 @@ def bench_experiment(
         ``low`` or ``high``.
     shows : sequence of str
         Signals of the model that a run shows.
+    loads : mapping of str to (ndarray, ndarray), optional
+        Port to time and load, beside the brake's.
 
     Raises
     ------
@@ -314,7 +321,7 @@ def bench_experiment(
     shift = float(log.motor[0])
     middle = shift / ratio
     inputs = Inputs(
-        log.duration, "position", (log.time, command), loads={"brake": brake},
+        log.duration, "position", (log.time, command), loads={"brake": brake, **(loads or {})},
         initial={
             "motor_position": shift,
             "motor_speed": float(log.speed[0]),

@@ -178,6 +178,21 @@ CASES = (
         show=_show_compliance,
     ),
     PublishedCase(
+        "torino-drops",
+        "Drop weights on a bench with hidden stiffness and damping, estimate both, run the model.",
+        "forty drops on the bench, and the model",
+        _R + "torino_bench.drops:reproduce_drops",
+        page=_R + "torino_bench.drops_page:drops_page",
+    ),
+    PublishedCase(
+        "torino-fmeca",
+        "Log each failure mode of the printed table on the bench, and diagnose it.",
+        "thirteen logs, twelve diagnoses",
+        _R + "torino_bench.fmeca:reproduce_fmeca",
+        ("component", "mode", "fault", "change_percent", "channel", "seen", "answer"),
+        page=_R + "torino_bench.fmeca_page:fmeca_page",
+    ),
+    PublishedCase(
         "low-fidelity",
         "Compare the reduced-order model with the switching one in the three cases it must pass.",
         "seven runs",
