@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import tomlkit
 
-from elevon import Actuator
+from elevon import Actuator, simulate
 from elevon.errors import FormatError, InputError
 from elevon.prognose import LAWS, Inspection, Law, Mission, Seen, predict, respond
 from elevon.prognose.history import read_history, write_stamp
-from elevon.prognose.requirement import Requirement
+from elevon.prognose.requirement import MEASURES, Requirement, RunSignals
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 
 KEY = "backlash@transmission"
@@ -310,6 +310,25 @@ def test_a_ball_screw_and_its_stall_load():
     result = predict([], actuator, flight, response=tables)
     mean = 0.5e-3 / (2e-11 * tables.drivers["friction_work"][0])
     assert result.median == pytest.approx(mean, rel=0.2)
+
+
+def test_no_load_speed_is_the_greatest_that_holds():
+    """The bench's drive turns at 500 rpm at most: 24.2 deg/s behind 1:124."""
+    requirement = Requirement(name="fast", measure="no_load_speed", limit="15 deg/s", step="60 deg")
+    assert requirement.unit("rad", "N m", {}) == "rad/s"
+    time = np.arange(0.0, 2.0, 0.01)
+    position = -np.clip(0.5 * time, 0.0, 0.6)
+    run = RunSignals(time, {"command": np.full(200, -1.0), "output_position": position})
+    assert requirement.value([run]) == pytest.approx(0.5, rel=1e-6)
+    flight = Scenario.from_dict(FLIGHT["scenario"])
+    (scenario,) = MEASURES["no_load_speed"].scenarios(requirement, flight)
+    done = simulate(
+        "torino-rotary", scenario, fidelity="low", record="command,output_position@400 Hz"
+    )
+    signals = {name: done[name].values for name in ("command", "output_position")}
+    speed = requirement.value([RunSignals(done["command"].time, signals)])
+    assert speed == pytest.approx(500 * np.pi / 30 / 124, rel=0.01)
+    assert speed > requirement.threshold("rad/s")
 
 
 def test_a_landing_gear_locks_in_time_until_its_bearings_are_worn():

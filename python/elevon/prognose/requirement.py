@@ -133,7 +133,7 @@ class Requirement(BaseModel):
                 known = ", ".join(faults)
                 raise InputError(f"requirement {self.name}: no law drives {self.fault}: {known}")
             return faults[self.fault]
-        return {"output": output, "load": load}.get(
+        return {"output": output, "load": load, "output/s": f"{output}/s"}.get(
             MEASURES[self.measure].unit, MEASURES[self.measure].unit
         )
 
@@ -200,6 +200,18 @@ def _overshoot(runs: Sequence[RunSignals], _requirement: Requirement) -> float:
 def _rise_time(runs: Sequence[RunSignals], _requirement: Requirement) -> float:
     done = runs[0]["output_position"] / float(runs[0]["command"][-1]) >= 0.9
     return float(runs[0].time[np.argmax(done)]) if done.any() else math.inf
+
+
+_WINDOW = 0.05  # s over which a speed must hold to count: longer than the sensors' steps
+
+
+def _no_load_speed(runs: Sequence[RunSignals], _requirement: Requirement) -> float:
+    """Greatest speed towards a step without load that holds over a short window."""
+    run = runs[0]
+    ends = np.interp(run.time + _WINDOW, run.time, run["output_position"])
+    whole = run.time + _WINDOW <= run.time[-1]
+    travel = np.sign(run["command"][-1]) * (ends - run["output_position"])
+    return float(travel[whole].max() / _WINDOW)
 
 
 _CYCLES = 6.0
@@ -292,6 +304,10 @@ MEASURES: dict[str, Measure] = {
     ),
     "rise_time": Measure(
         "time to nine tenths of a step", "s", _BOTH, _rise_time, _step_runs, needs=("step",)
+    ),
+    "no_load_speed": Measure(
+        "greatest speed of a step without load", "output/s", _BOTH, _no_load_speed, _step_runs,
+        at_least=True, needs=("step",),
     ),
     "bandwidth": Measure(
         "frequency at which a sine's amplitude falls to -3 dB", "Hz", _BOTH, _bandwidth, _sine_runs,

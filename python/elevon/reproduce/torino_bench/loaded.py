@@ -7,12 +7,12 @@ first period is dropped, as the thesis does.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.plain import Plain
@@ -163,6 +163,5 @@ def _row(log: Log, model: Actuator, net: float, torque: float) -> LoadedRow:
     return LoadedRow(net, torque, cell, current, bench, simulated, percent)
 
 
-def _lost(time: Sequence[float], motor: Sequence[float], encoder: Sequence[float]) -> float:
-    return math.degrees(lost_motion(np.asarray(time), np.asarray(motor), np.asarray(encoder),
-                                    DROPPED))  # fmt: skip
+def _lost(time: Floats, motor: Floats, encoder: Floats) -> float:
+    return math.degrees(lost_motion(time, motor, encoder, DROPPED))

@@ -39,9 +39,12 @@ def loaded_page(result: LoadedCampaign, *, date: str | None = None) -> Report:
     section.figure(figure, "Torques of the tests (thesis, Figure 84) and the current they cost.")
     columns = ["Net backlash [deg]", "Set [N m]", "Cell [N m]", "Current [A]", "Bench lost [deg]",
                "Model lost [deg]", "Position error [% of range]"]  # fmt: skip
-    rows = [[math.degrees(r.net_backlash_rad), r.set_nm, r.cell_nm, r.current_a, r.bench_lost_deg,
-             r.model_lost_deg, r.position_percent] for r in result.rows]  # fmt: skip
-    report.section("Tests").table(ReportTable(columns, rows, "After the first period.", digits=4))
+    tests: list[list[object]] = [
+        [math.degrees(r.net_backlash_rad), r.set_nm, r.cell_nm, r.current_a, r.bench_lost_deg,
+         r.model_lost_deg, r.position_percent]
+        for r in result.rows
+    ]  # fmt: skip
+    report.section("Tests").table(ReportTable(columns, tests, "After the first period.", digits=4))
     report.section("Checks").checks(result.checks)
     command = (
         f"elevon reproduce torino-loaded --fidelity {result.fidelity} --seed {result.seed} "
