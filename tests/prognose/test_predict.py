@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import tomlkit
 
-from elevon import Actuator, simulate
+from elevon import Actuator, Scenario, simulate
 from elevon.errors import FormatError, InputError
 from elevon.prognose import LAWS, Inspection, Law, Mission, Seen, predict, respond
 from elevon.prognose.history import read_history, write_stamp
