@@ -216,8 +216,8 @@ def _rows(log: Log, trigger: float, ratio: float, number: int) -> list[DropRow]:
     motor, encoder = _angles(log.motor, log.output, ratio)
     rows = []
     for mass, at in zip(MASSES, drop_times(), strict=True):
-        rest = _within(log, trigger + at + SETTLED, trigger + at + HANGS - 0.05)
-        loss = float(np.mean(motor[rest] - encoder[rest]))
+        settled = _within(log, trigger + at + SETTLED, trigger + at + HANGS - 0.05)
+        loss = float(np.mean(motor[settled] - encoder[settled]))
         rows.append(DropRow(mass, number, CABLES * mass * GRAVITY * RADIUS, loss))
     return rows
 
@@ -271,9 +271,9 @@ def _misfits(
     ratio = model.parameters.value("gear.ratio")
     errors = []
     for (drop, _), run in zip(tests, runs, strict=True):
-        shown, seen = run.seen(drop.log).channels, drop.log
+        simulated, seen = run.seen(drop.log).channels, drop.log
         motor, encoder = _angles(seen["motor_position"], seen["output_position"], ratio)
-        other = _angles(shown["motor_position"], shown["encoder_position"], ratio)
+        other = _angles(simulated["motor_position"], simulated["encoder_position"], ratio)
         errors.append(float(np.mean(((motor - encoder) - (other[0] - other[1])) ** 2)))
     means = np.reshape(errors, (len(tried), len(drops))).mean(axis=1)
     return tuple(zip(tried, means.tolist(), strict=True))
@@ -342,7 +342,7 @@ def _loss_error(
     """RMS over the drops of the angle lost at rest, model less bench [deg]."""
     errors = []
     for at in drop_times():
-        rest = _within(log, trigger + at + SETTLED, trigger + at + HANGS - 0.05)
-        lost = [float(np.mean(m[rest] - e[rest])) for m, e in (bench, model)]
+        settled = _within(log, trigger + at + SETTLED, trigger + at + HANGS - 0.05)
+        lost = [float(np.mean(m[settled] - e[settled])) for m, e in (bench, model)]
         errors.append(lost[1] - lost[0])
     return float(np.sqrt(np.mean(np.square(errors))))
