@@ -9,7 +9,9 @@ import pytest
 from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs
 from elevon.calibrate.candidates import candidates
+from elevon.calibrate.door import _refused
 from elevon.calibrate.identify import SensitivityTable, choose
+from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.speed_runs import SpeedRuns
 from elevon.cli.runner import run
 from elevon.errors import InputError, Interrupted, UnknownNameError
@@ -183,3 +185,15 @@ def test_command_line_refusals(tmp_path, log_paths, capsys):
     empty = tmp_path / "empty.csv"
     empty.write_text("")
     assert run(["validate", str(empty), "--actuator", "torino-rotary"]) == 2
+
+
+def test_values_that_a_fidelity_refuses_are_said():
+    """A fit runs one fidelity; what it gives may be none for the other."""
+    before = Actuator.load("torino-rotary")
+    after = before.with_values(
+        {"friction.dynamic": 2.0 * before.parameters.value("friction.static")}
+    )
+    result = Calibration(actuator=after, before=before, logs=(), parameters={})
+    texts = _refused(result).findings
+    assert any("fidelity refuses what was fitted: friction.dynamic" in text for text in texts)
+    assert _refused(replace(result, actuator=before)) == replace(result, actuator=before)

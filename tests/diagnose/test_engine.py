@@ -12,8 +12,11 @@ from elevon.diagnose.engine.case import case_of, detector_of
 from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.posterior import marginals, posterior, quantiles
 from elevon.diagnose.engine.replay import _RECENT, replay
+from elevon.diagnose.positions.log import LONGEST, _first_part
 from elevon.diagnose.positions.reading import PositionReading
 from elevon.errors import InputError, UnknownNameError
+from elevon.logs.drive import drive_log
+from elevon.logs.log import Log
 from elevon.logs.read import read_logs
 from tests.cli.conftest import elevon_cli  # noqa: F401 - a fixture
 from tests.diagnose.virtual import bench_logs
@@ -343,3 +346,21 @@ def test_on_the_high_model_with_another_drive(unit, tmp_path, fault, best):
     path = bench(tmp_path / "log", 51, *([fault] if fault else []), **pwm)
     result = answer(unit.with_values({"drive.kind": "pwm"}), path, base)
     assert result.best == best
+
+
+def test_a_long_log_is_read_for_a_while():
+    """Ten minutes cost what forty seconds do: the runs are as long as what is read."""
+    time = np.arange(0.0, 120.0, 1e-3)
+    turn = np.where(time > 20.0, 5.0 * np.sin(2.0 * np.pi * 0.2 * time), 0.0)
+    speed = np.gradient(turn, time)
+    gap = 124.0 * np.radians(0.1) * np.sign(speed)
+    log = Log("long", time, {
+        "speed_ref": speed, "motor_speed": speed, "torque_current": np.sign(speed),
+        "current_ref": np.sign(speed), "motor_position": turn,
+        "output_position": (turn - gap) / 124.0,
+    })  # fmt: skip
+    part = _first_part(drive_log(log))
+    assert part.duration == pytest.approx(LONGEST, abs=0.01)
+    assert len(part.time) <= 500 * LONGEST
+    assert 18.0 < part.start < 20.1
+    assert _first_part(part) is part

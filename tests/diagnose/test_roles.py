@@ -15,6 +15,7 @@ from elevon.diagnose.engine.replay import _RECENT, _severities, spread_of
 from elevon.diagnose.roles.load import load_alike, read_load
 from elevon.diagnose.roles.log import _onset, role_log
 from elevon.diagnose.roles.numbers import numbers_of
+from elevon.diagnose.roles.series import lines
 from elevon.errors import InputError, UnknownNameError
 from elevon.logs.log import Log
 from studies.fault_limits.standard import Day, day_logs, diagnosed, standard_tests
@@ -341,3 +342,41 @@ def test_an_answer_by_roles_does_not_depend_on_earlier_ones(screw):
     _RECENT.clear()
     diagnose([like], screw, faults=few)
     assert diagnose([item], screw, faults=few) == alone
+
+
+def test_one_sample_of_jitter_at_square_edges_is_the_same_test(screw):
+    """An edge that falls on one sample in a log falls on the next one in another."""
+    item = role_log(log(screw), screw)
+    time = np.arange(0.0, 8.0, 0.01)
+
+    def square(late):
+        edges = np.arange(0.0, 8.0, 0.5) + 0.01 * np.resize(late, 16)
+        level = np.where(np.searchsorted(edges, time + 1e-9, side="right") % 2 == 1, 1e-3, 0.0)
+        return replace(
+            item, rate=100.0, seconds=8.0, command=lines(time, level, 2e-7), load=None, stroke=None,
+            note="",
+        )  # fmt: skip
+
+    base, jittered, other = square([0]), square([0, 1, 1, 0, 1]), square([0, 12, 0, 12])
+    assert base.same(jittered)
+    assert jittered.same(base)
+    assert not base.same(other)
+
+
+def test_a_servo_with_one_position_is_read_by_its_roles():
+    """Without the motor's own position there is no lost motion to regress, but a command to run."""
+    unit = Actuator.load("torino-rotary")
+    sine = {"kind": "sine", "amplitude": "8 deg", "frequency": "0.5 Hz"}
+    scenario = Scenario.from_dict({"duration": 6, "command": {"terms": [sine]}})
+    record = "command,encoder_position,current_q_meas@400 Hz"
+    logs = [
+        Log.of(simulate(drawn(unit, np.random.default_rng(k)), scenario, fidelity="low",
+                        record=record, faults=faults), f"{k}")
+        for k, faults in ((1, []), (2, ["friction@transmission=1"]))
+    ]  # fmt: skip
+    few = ["friction@transmission", "backlash@transmission"]
+    worn = diagnose(logs[1:], unit, baselines=logs[:1], faults=few)
+    assert worn.best == ("friction@transmission",)
+    assert worn.faults[0].interval[0] < 1.0 < worn.faults[0].interval[1]
+    with pytest.raises(InputError, match="diagnosis of a servo needs motor_position"):
+        diagnose([logs[1].without("command")], unit)

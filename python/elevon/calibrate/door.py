@@ -8,9 +8,11 @@ logged is fitted in closed loop.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from elevon.actuator import Actuator
 from elevon.calibrate.drops import is_drop_table, run_drops
 from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.validation import Validation
@@ -70,7 +72,24 @@ def calibrate(
     if isinstance(table, (str, os.PathLike)) and is_drop_table(Path(table)):
         return run_drops(Path(table), model)
     request = CalibrationRequest(free, per_log, fidelity, transient, promise)
-    return way_of(as_logs(logs), model).calibrate(model, request, progress)
+    return _refused(way_of(as_logs(logs), model).calibrate(model, request, progress))
+
+
+def _refused(result: Calibration) -> Calibration:
+    """Say what a fidelity refuses of the values that were fitted: the fit runs one of them."""
+    texts = []
+    for fidelity in ("high", "low"):
+        before = {str(f["path"]) for f in _errors(result.before, fidelity)}
+        texts += [
+            f"the {fidelity} fidelity refuses what was fitted: {finding['message']}"
+            for finding in _errors(result.actuator, fidelity)
+            if finding["path"] not in before
+        ]
+    return replace(result, findings=(*result.findings, *texts)) if texts else result
+
+
+def _errors(actuator: Actuator, fidelity: str) -> list[Mapping[str, object]]:
+    return [f for f in actuator.findings(fidelity) if f.get("severity", "error") == "error"]
 
 
 def validate(

@@ -30,15 +30,30 @@ if TYPE_CHECKING:
     from elevon.logs.log import Log
 
 
+#: What regressions of both positions need.
+_SERVO = ("output_position", "motor_position", "speed_ref", "motor_speed")
+
+
 def reading_of(log: Log, actuator: Actuator) -> Reading:
     """Read a log as diagnosis sees it: of a turning servo by its positions, else by its roles.
+
+    A servo's log that lacks what the regressions of both positions need is read by its roles, too,
+    where it has a command.
 
     Raises
     ------
     InputError
         It cannot be diagnosed.
     """
-    return PositionReading(log, actuator) if turns(actuator) else role_log(log, actuator)
+    lost = [role for role in _SERVO if not log.has(role)]
+    if not turns(actuator) or (lost and log.has("command")):
+        return role_log(log, actuator)
+    if lost:
+        raise InputError(
+            f"{log.name}: diagnosis of a servo needs {', '.join(lost)}, or a command and what "
+            f"followed it; roles: {', '.join(log) or 'none'}"
+        )
+    return PositionReading(log, actuator)
 
 
 @one_blas_thread()

@@ -68,7 +68,7 @@ def prepared(log: Log, actuator: Actuator) -> Log:
 
 def _first_part(log: Log) -> Log:
     """A long log as far as it is read, from the run-in before it moves, at the model's rate."""
-    if log.duration <= LONGEST:
+    if log.duration <= LONGEST * (1.0 + 1e-9):
         return log
     speed = np.where(log.good, np.abs(log.speed), 0.0)
     first = float(log.time[int(np.argmax(speed > _MOVING * speed.max()))])

@@ -303,7 +303,7 @@ class RoleReading(Reading):
         if self.seconds > _SOONER * seconds:
             return False
         grid = np.linspace(0.0, seconds, 200)
-        if self._apart(other, grid) > _ALIKE:
+        if self._apart(other, grid, 1.0 / min(self.rate, other.rate)) > _ALIKE:
             return False
         if self.note and self.note == other.note and self.settings == other.settings:
             return True
@@ -320,11 +320,18 @@ class RoleReading(Reading):
         """Whether the two differ by less than the clocks' phases, which the days have, explain."""
         return self.serves(other)
 
-    def _apart(self, other: RoleReading, grid: Floats) -> float:
-        """RMS of the difference of two commands from where each began, over the range."""
+    def _apart(self, other: RoleReading, grid: Floats, jitter: float = 0.0) -> float:
+        """RMS of the difference of two commands from where each began, over the range.
+
+        With a jitter [s] the other's command may come by so much sooner or later at each instant:
+        an edge falls on one sample or the next.
+        """
         size = max(float(np.ptp(self.command[1])), 1e-12)
-        ways = [np.interp(grid, *x.command) - x.command[1][0] for x in (self, other)]
-        return float(np.sqrt(np.mean((ways[0] - ways[1]) ** 2))) / size
+        this = np.interp(grid, *self.command) - self.command[1][0]
+        shifts = (-jitter, 0.0, jitter) if jitter else (0.0,)
+        near = [np.interp(grid + s, *other.command) - other.command[1][0] for s in shifts]
+        off = this - np.clip(this, np.min(near, axis=0), np.max(near, axis=0))
+        return float(np.sqrt(np.mean(off**2))) / size
 
     def within(self, seconds: float, like: RoleReading | None = None) -> RoleReading:
         """Return the test up to some seconds after its onset."""
