@@ -191,7 +191,7 @@ RECIPES = {
                           "--force", long=True, points=10, code=(0, 1)),
     "plot": _analysis("log/log.csv", "--out", "log.html", "--force",
                       before=(("plot", "base/log.csv", "--out", "log.html"),),
-                      logs=("log", "base")),
+                      logs=("log", "base"), long=True, points=8),
     "doctor": _analysis("log/log.csv", *ROTARY, "--baseline", "base/log.csv", "--out", "look",
                         "--force", logs=("log", "base"), long=True, points=8, code=(0, 1)),
     "diagnose": _analysis("log/log.csv", *ROTARY, "--baseline", "base/log.csv", "--report",
