@@ -25,10 +25,15 @@ if TYPE_CHECKING:
     from elevon.report import Report
     from studies.fault_limits.limits import FaultLimits
 
-__all__ = ["app", "fault_limits", "fault_limits_page"]
+__all__ = ["app", "fault_limits", "fault_limits_page", "independent"]
 
 _LOGGED = Annotated[int, typer.Option("--runs", min=1, help="Units of the bench, 95 logs each.")]
 _WATCHED = Annotated[int, typer.Option("--units", min=1, help="Benches, 39 streams each.")]
+_FOREIGN = Annotated[int, typer.Option("--units", min=1, help="Units of the foreign bench.")]
+_HEALTHY = Annotated[int, typer.Option("--healthy", min=4, help="Healthy logs of each test.")]
+_SWITCHING = Annotated[
+    int, typer.Option("--switching", min=0, help="Healthy logs of the screw and of the gear.")
+]
 _INSPECTED = Annotated[int, typer.Option("--units", min=2, help="Benches, 40 inspections each.")]
 _PAIRED = Annotated[int, typer.Option("--units", min=2, help="Units of every pair.")]
 _FOLDER = Annotated[
@@ -94,6 +99,22 @@ def fault_limits(
 
     plan = LimitsPlan(days, injected, fidelity, seed)
     return study_fault_limits(plan, actuators=actuator, folder=folder, progress=progress)
+
+
+def independent(
+    units: int,
+    healthy: int,
+    switching: int,
+    seed: int,
+    *,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> Any:
+    """Return diagnosis judged by a plan of these numbers."""
+    from studies.independent import Plan, study_independent
+
+    plan = Plan(units, healthy, switching, seed)
+    return study_independent(plan, processes=processes, progress=progress)
 
 
 def _save_table(result: Any, options: Options) -> None:
@@ -173,6 +194,20 @@ _STUDIES = (
         page="studies.diagnosis_limits.page:limits_report",
         options={"runs": (_LOGGED, 8)},
         names={"folder": "out", "units": "runs"},
+    ),
+    PublishedCase(
+        "independent",
+        "Diagnose logs of another program: false alarms, unknown causes, single faults.",
+        "making and diagnosing logs",
+        "studies.commands:independent",
+        ("what", "hits", "logs", "share", "interval"),
+        page="studies.independent.page:independent_report",
+        options={
+            "units": (_FOREIGN, 4),
+            "healthy": (_HEALTHY, 17),
+            "switching": (_SWITCHING, 60),
+            "processes": (_PROCESSES, None),
+        },
     ),
     PublishedCase(
         "monitor-delay",

@@ -50,6 +50,14 @@ struct bench {
     double inductance;         /* H */
     double output_start;         /* rad */
     double motor_start;        /* share of half the backlash, -1 to 1 */
+    double wheel;              /* rad at the output, error of the gear once an output turn; 0: none */
+    double wheel_phase;        /* rad */
+    double pinion;             /* rad at the output, error of the gear once a motor turn; 0: none */
+    double pinion_phase;       /* rad */
+    double phase_offset;       /* A, of one phase's current sensor: a torque once an electrical turn */
+    double pole_pairs;
+    double warming;            /* 1/s, growth of the resistance */
+    double pull;               /* N m on the motor shaft, constant */
 };
 
 enum { OUTPUT, MOTOR, SPEED_REF, SPEED, CURRENT_REF, CURRENT, VOLTAGE, REACTION, COLUMNS };
@@ -145,7 +153,8 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
         i += (i_ref - i) * follow;
         i_shown += (i - i_shown) * smooth;
         w_shown += (w - w_shown) * slow;
-        double active = b->torque_constant * i + b->cogging * sin(b->cogging_teeth * motor)
+        const double made = i - b->phase_offset * sin(b->pole_pairs * motor);
+        double active = b->torque_constant * made - b->pull + b->cogging * sin(b->cogging_teeth * motor)
                       - b->viscous * w - load / b->ratio;
         double moving = b->dry;
         if (b->stribeck > 0.0)
@@ -166,12 +175,14 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
             row[SPEED] = w_shown;
             row[CURRENT_REF] = i_ref;
             row[CURRENT] = i_shown;
-            row[VOLTAGE] = b->resistance * i + b->inductance * (i - i_before) / dt
+            row[VOLTAGE] = b->resistance * (1.0 + b->warming * n * dt) * i + b->inductance * (i - i_before) / dt
                          + b->torque_constant / 1.5 * w;
             row[REACTION] = friction * share;
         }
         motor += w * dt;
-        const double lead = motor / b->ratio - output;
+        const double meshed = motor / b->ratio + b->wheel * sin(output + b->wheel_phase)
+                            + b->pinion * sin(motor + b->pinion_phase);
+        const double lead = meshed - output;
         if (b->elastic) {
             load = 0.0;
             if (fabs(lead) > half) {
@@ -183,9 +194,9 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
             slide(&output_w, load, b->output_dry, b->output_dry, b->output_inertia, dt);
             output += output_w * dt;
         } else if (lead > half) {
-            output = motor / b->ratio - half;
+            output = meshed - half;
         } else if (lead < -half) {
-            output = motor / b->ratio + half;
+            output = meshed + half;
         }
         if (!(fabs(w) < 1e4)) {
             free(past);

@@ -64,6 +64,14 @@ class Bench:
     quantised_loop: bool = True
     resistance: float = 2.75
     inductance: float = 0.0305
+    wheel: float = 0.0
+    wheel_phase: float = 0.0
+    pinion: float = 0.0
+    pinion_phase: float = 0.0
+    phase_offset: float = 0.0
+    pole_pairs: float = 4.0
+    warming: float = 0.0
+    pull: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -150,7 +158,7 @@ class Run:
     trigger: float
 
 
-def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
+def run(bench, sensors, trial, seed=0, duration=DURATION, start=None, log=LOG, counts=80_000.0):
     """Carry a trial out; the command starts and the trigger rises at instants drawn by the seed."""
     rng = np.random.default_rng([seed, 1])
     start = float(rng.uniform(0.3, 1.5)) if start is None else start
@@ -173,9 +181,9 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
         "dt": STEP,
         "control_every": round(bench.sample_time / STEP),
         "position_every": round(outer / STEP),
-        "log_every": round(LOG / STEP),
+        "log_every": round(log / STEP),
         "believed_constant": bench.torque_constant,
-        "encoder_counts": 80_000.0,
+        "encoder_counts": counts,
         "motor_counts": 2.0**24,
         "output_start": output,
         "motor_start": where,
@@ -183,11 +191,11 @@ def run(bench, sensors, trial, seed=0, duration=DURATION, start=None):
     program, names = library()
     values = {**vars(bench), **vars(sensors), **shared}
     packed = (ctypes.c_double * len(names))(*(float(values[name]) for name in names))
-    rows = np.zeros((round(duration / LOG), len(COLUMNS)))
+    rows = np.zeros((round(duration / log), len(COLUMNS)))
     pointers = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (command, brake, rows)]
     if program.run(packed, *pointers):
         raise RuntimeError(f"the bench runs away: {bench}")
-    time = np.arange(len(rows)) * LOG
+    time = np.arange(len(rows)) * log
     return Run(trial, time, dict(zip(COLUMNS, rows.T, strict=True)), start, trigger)
 
 

@@ -10,12 +10,13 @@ import pytest
 from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.answer import Reason
 from elevon.diagnose.engine.candidates import CANDIDATES
-from elevon.diagnose.engine.case import LogCase
+from elevon.diagnose.engine.case import LogCase, detector_of
 from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.diagnose.engine.explain import refuting
+from elevon.diagnose.engine.frame import Frame
 from elevon.diagnose.engine.healthy import healthy
-from elevon.diagnose.engine.likelihood import Frame, _somewhere
+from elevon.diagnose.engine.likelihood import _somewhere
 from elevon.diagnose.engine.not_modelled import not_modelled
 from elevon.diagnose.engine.replay import Replay
 from elevon.diagnose.engine.table import FeatureVector
@@ -107,6 +108,24 @@ def test_a_cause_that_a_feature_refutes_is_not_named():
     known, base = [(BACKLASH, 0.002)], [[1.0] * 5]
     assert refuting([_case([1.2, 1, 1, 1, 1], base)], known) is None
     assert refuting([_case([1.2, 1, 1, 1, 9.0], base)], known).feature == "speed_gain"
+
+
+def test_a_fault_may_move_a_number_that_the_model_leaves_alone_by_a_share_of_its_shift():
+    """Backlash of 24 deviations and one of 3.5 in another number is backlash; of 20, another."""
+    base = [[1.0] * 5]
+    near, far = ([1.7, 1, 1, 1, 1 + k * 0.047] for k in (3.5, 20.0))
+    named = answer_of([_case(near, base)], [BACKLASH], 0.05)
+    assert (named.status, named.best) == ("faulty", (BACKLASH.key,))
+    assert answer_of([_case(far, base)], [BACKLASH], 0.05).status == "unknown_fault"
+
+
+def test_one_feature_alone_is_a_direction_of_the_test():
+    """A number that no candidate moves is seen by itself, at the rate that is set."""
+    case = _case([1, 1, 1, 1, 1.2], [[1.0] * 5])
+    residual, root, detector = detector_of([case], [BACKLASH])
+    along = detector.ratio((root @ residual)[None, :])[0]
+    assert along > Detector(root[:, :1].T, [False], 10.0).ratio((root @ residual)[None, :])[0]
+    assert detector.score((root @ residual)[None, :])[0] > detector.threshold(0.05)
 
 
 def test_a_unit_that_the_model_does_not_show_is_not_diagnosed():

@@ -6,7 +6,8 @@ import pytest
 from elevon import Actuator
 from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.engine.case import case_of
-from elevon.diagnose.engine.likelihood import Frame, one_fault, prior_density, two_faults
+from elevon.diagnose.engine.frame import Frame
+from elevon.diagnose.engine.likelihood import one_fault, prior_density, two_faults
 from elevon.diagnose.engine.posterior import quantiles
 from elevon.diagnose.positions.reading import PositionReading
 from tests.diagnose.virtual import bench_logs
@@ -104,3 +105,15 @@ def test_the_models_own_error_may_be_fixed_at_the_best_severities(frames, name):
     )
     off = np.abs(chain - ends)
     assert (off < 4.0 * error + 0.25 * spread).all()
+
+
+def test_where_the_sign_makes_no_difference_the_interval_has_both():
+    """Shifts that are even in the severity: half of the mass lies on either side."""
+    gain = next(c for c in CANDIDATES if c.key == "gain_drift@control.position")
+    frame = Frame(
+        np.array([4.0, 0.0]), np.eye(2), 200.0,
+        lambda _key, s: np.column_stack([25.0 * np.abs(s), np.zeros(len(s))]), np.zeros(2),
+    )  # fmt: skip
+    result = one_fault(frame, gain, 1.0)
+    (grid,), (weight,) = result.grids, result.weights
+    assert float(weight[grid < 0.0].sum()) == pytest.approx(0.5, abs=0.02)

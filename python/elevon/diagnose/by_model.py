@@ -12,6 +12,7 @@ from elevon.diagnose.engine.candidates import chosen, not_candidates
 from elevon.diagnose.engine.case import case_of
 from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.diagnose.engine.reading import ReplayUnit
+from elevon.diagnose.engine.soundness import check_sizes, unsound
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 from elevon.diagnose.positions.reading import PositionReading
 from elevon.diagnose.roles.log import role_log
@@ -45,6 +46,7 @@ def reading_of(log: Log, actuator: Actuator) -> Reading:
     InputError
         It cannot be diagnosed.
     """
+    check_sizes(log, actuator)
     lost = [role for role in _SERVO if not log.has(role)]
     if not turns(actuator) or (lost and log.has("command")):
         return role_log(log, actuator)
@@ -103,7 +105,8 @@ def diagnose(
     if spread is not None:
         result = replace(result, findings=(*result.findings, spread.threshold_text(false_alarm)))
     blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
-    findings = (*result.findings, *notes)
+    early = (text for log in logs for text in unsound(log))
+    findings = (*early, *result.findings, *notes)
     return replace(
         result, unobservable=blind, findings=findings, seconds=clock.perf_counter() - begin
     )

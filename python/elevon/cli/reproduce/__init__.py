@@ -18,6 +18,7 @@ STUDIES = (
     "diagnosis-optimisers",
     "fault-limits",
     "foreign",
+    "independent",
     "inspection-error",
     "monitor-delay",
     "next-test",

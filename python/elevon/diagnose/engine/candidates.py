@@ -96,6 +96,9 @@ _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage
 # A weak pole pair multiplies the coefficient of phase j by a window of
 # theta_m - phi - 2 pi (j-1)/3, whose first harmonic is a dynamic eccentricity: the same sideband.
 #
+# A resolver off by an angle of d turns the drive's q axis by d: torque and EMF by its cosine, as
+# lost flux would; the current beside it, on the other axis, is in no log.
+#
 # An encoder's gain is seen as the ratio of the two positions, and so is, with the other sign, a
 # resolver's. Whether it reaches the position loop depends on where the drive closes it, which no
 # healthy log tells.
@@ -108,7 +111,8 @@ CANDIDATES: tuple[CandidateFault, ...] = (
     CandidateFault("eccentricity_dynamic", "motor", "1", 0.0, 0.6, _MOTOR / 4, 0.10,
                    known_features=("current_sideband", "voltage_sideband"),
                    ambiguous=(("local_demagnetisation", "motor"),)),
-    CandidateFault("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 4, 0.05),
+    CandidateFault("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 4, 0.05,
+                   ambiguous=(("offset", "sensor.resolver"),)),
     CandidateFault("unbalance", "motor.rotor", "kg m2", 0.0, 4e-4, _BEARING / 10, 0.05),
     CandidateFault("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003),
     CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05),

@@ -13,7 +13,7 @@ from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.detection import DRAWS, Detector
 from elevon.diagnose.engine.healthy import Elsewhere, Healthy, healthy
 from elevon.diagnose.engine.reading import Reading
-from elevon.diagnose.engine.replay import Replay, modelled, replay
+from elevon.diagnose.engine.replay import Replay, bounded, modelled, replay
 from elevon.diagnose.engine.spread import LearnedSpread
 from elevon.diagnose.engine.table import FeatureVector
 
@@ -58,6 +58,15 @@ class LogCase:
         return self.unit.covariance + np.diag(self.features.std**2)
 
     @property
+    def residual(self) -> Floats:
+        """How far the features are from the healthy unit's, shape (k,), bounded as shifts are."""
+        at = self.model.places(self.unit.names)
+        records = [self.model.table[name] for name in self.unit.names]
+        return bounded(
+            self.features.values - self.unit.mean, records, self.model.healthy.values[at]
+        )
+
+    @property
     def errors(self) -> Floats:
         """Model error of each number's shift on its own, as a share, shape (k,)."""
         return np.array([self.model.table[name].error for name in self.unit.names])
@@ -87,7 +96,11 @@ def case_of(
     baselines: Sequence[Reading],
     spread: LearnedSpread | None = None,
 ) -> LogCase:
-    """Hold a log against the model and the baselines, with the spread that was learnt, if any."""
+    """Hold a log against the model and the baselines, in whatever order they come.
+
+    With the spread that was learnt, if any.
+    """
+    baselines = sorted(baselines, key=lambda b: b.key())
     others = [b for b in baselines if not item.same(b)]
     item, same = item.matched([b for b in baselines if item.same(b)])
     model = replay(item, candidates, same)
@@ -114,7 +127,9 @@ def transferred(item: Reading, model: Replay) -> FeatureVector:
     features, there, here = item.features, modelled(item), model.healthy
     values = features.values.copy()
     for k, name in enumerate(features.names):
-        if name in here.names and name in there.names and model.table[name].kind != "size":
+        if name not in here.names or name not in there.names:
+            continue
+        if model.table[name].kind != "size" and not model.table[name].constant:
             values[k] += float((here.only([name]).values - there.only([name]).values)[0])
     return replace(features, values=values)
 
@@ -174,10 +189,11 @@ def detector_of(
 
     A shift shorter than
     `_DIRECTED` has no direction that is known: the runs' rounding is as large, and another in each.
+    Each feature alone is a direction, too: something else may move no other.
     """
     residual, covariance = joined(cases)
     root = np.linalg.inv(np.linalg.cholesky(covariance))
-    rows, both = [], []
+    rows, both = [root.T], [True] * len(root)
     for c in candidates:
         at = cases[0].model.severities[c.key]
         moved = shift_of(cases, c.key, at[at != 0.0]) @ root.T
@@ -202,7 +218,7 @@ def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:
     """Stack the logs; what changes from run to run is independent between them."""
     from scipy.linalg import block_diag
 
-    residual = np.concatenate([case.features.values - case.unit.mean for case in cases])
+    residual = np.concatenate([case.residual for case in cases])
     return residual, np.asarray(block_diag(*[case.covariance for case in cases]))
 
 

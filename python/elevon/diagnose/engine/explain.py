@@ -19,6 +19,7 @@ from elevon.diagnose.engine.answer import (
 )
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase, errors_of, joined, shift_of, uncertainty_of
+from elevon.diagnose.engine.frame import stray_of
 from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
 
 LISTED = 0.02  # probability below which a cause is not listed
@@ -55,9 +56,14 @@ def unexplained(
 def refuting(
     cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
 ) -> Reason | None:
-    """Return the feature that contradicts faults most, if one does by `REFUTED` deviations."""
+    """Return the feature that contradicts faults most, if one does by `REFUTED` deviations.
+
+    A stray of the faults' shift (`likelihood.STRAY`) contradicts nothing.
+    """
     left, wide = _left(cases, faults)
-    std = np.sqrt(np.diag(wide))
+    _, covariance = joined(cases)
+    shifts = [shift_of(cases, c.key, np.array([severity]))[0] for c, severity in faults]
+    std = np.hypot(np.sqrt(np.diag(wide)), stray_of(covariance, shifts))
     k = int(np.argmax(np.abs(left) / std))
     if abs(left[k]) < REFUTED * std[k]:
         return None

@@ -1,29 +1,31 @@
 """Marginal likelihood of one fault or two: search on coarse grids, integration on fine ones.
 
-A fault's model error has two parts: one that scales the whole shift (`CandidateFault.error`),
-carried exactly by the matrix determinant lemma, and one of each number on its own (what the current
-loop makes of a ripple, say), carried at the best severities, which are searched again with it.
+A fault's model error has three parts: one that scales the whole shift (`CandidateFault.error`),
+carried exactly by the matrix determinant lemma, one of each number on its own (what the current
+loop makes of a ripple, say), and strays: a few numbers that the fault moves although the model does
+not, or not so, by a share of its whole shift. The latter two are carried at the best severities,
+which are searched again with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import CandidateFault
+from elevon.diagnose.engine.frame import Frame, greedy, stray_of
 
-Shift = Callable[[str, Floats], Floats]
 SMALL = 0.05  # of the range: ASSUMED; severities below it are as frequent as each other
-_COARSE = 401
 _FINE = 121
 _PAIR = 41
 _REACH = 6.0  # deviations about the best point that a fine grid covers
 _WIDE = (3.0, 10.0, 30.0)  # deviations by which something else moves the features. ASSUMED
 _FEW = 8  # features that something else moves, at most, where it does not move all
+_NEAR = 5.0  # log density below the best one up to which a severity of the other sign counts
 _TURNS = 4  # of the search along one severity, then the other
 
 
@@ -55,88 +57,6 @@ class Hypothesis:
     best: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True)
-class Frame:
-    """Features less its healthy mean, and what whitens it.
-
-    Attributes
-    ----------
-    residual : ndarray, shape (k,)
-        As it is.
-    covariance : ndarray, shape (k, k)
-        Of it.
-    degrees : float
-        Of Student's distribution.
-    raw : callable
-        Key and severities, shape (m,), to shifts, shape (m, k).
-    errors : ndarray, shape (k,)
-        Deviation of each number's shift on its own, as a share of it.
-    uncertainty : callable, optional
-        Key and severity to a deviation of the features, shape (k,), beside that.
-    """
-
-    residual: Floats
-    covariance: Floats
-    degrees: float
-    raw: Shift
-    errors: Floats
-    uncertainty: Callable[[str, float], Floats] | None = None
-    root: Floats = field(init=False)
-    y: Floats = field(init=False)
-    log_det: float = field(init=False)
-    lines: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        lower = np.linalg.cholesky(self.covariance)
-        object.__setattr__(self, "root", np.linalg.inv(lower))
-        object.__setattr__(self, "y", self.root @ self.residual)
-        object.__setattr__(self, "log_det", 2.0 * float(np.sum(np.log(np.diag(lower)))))
-
-    def shift(self, key: str, severity: Floats) -> Floats:
-        """Whitened."""
-        return self.raw(key, severity) @ self.root.T
-
-    def line(self, c: CandidateFault) -> tuple[Floats, Floats]:
-        """Severities over the whole range, and their whitened shifts."""
-        if c.key not in self.lines:
-            grid = np.linspace(c.low, c.high, _COARSE)
-            self.lines[c.key] = (grid, self.raw(c.key, grid))
-        grid, raw = self.lines[c.key]
-        return grid, raw @ self.root.T
-
-    def loosened(self, faults: Sequence[tuple[CandidateFault, float]]) -> Frame:
-        """Return the frame with each number's own model error at these severities."""
-        extra = np.zeros(len(self.residual))
-        for c, severity in faults:
-            extra += (self.errors * self.raw(c.key, np.array([severity]))[0]) ** 2
-            if self.uncertainty is not None:
-                extra += self.uncertainty(c.key, severity) ** 2
-        return replace(self, covariance=self.covariance + np.diag(extra))
-
-    def log(self, residual: Floats, *errors: Floats) -> Floats:
-        """Log density of Student's distribution, shape (m,), but for a constant.
-
-        Each fault's model error, shape (m, k), adds its outer product to the unit covariance.
-        """
-        square = np.einsum("mk,mk->m", residual, residual)
-        log_det: Floats = np.full(len(residual), self.log_det)
-        if len(errors) == 1:
-            factor = 1.0 + np.einsum("mk,mk->m", errors[0], errors[0])
-            square = square - np.einsum("mk,mk->m", residual, errors[0]) ** 2 / factor
-            log_det = log_det + np.log(factor)
-        elif len(errors) == 2:
-            a, b = (1.0 + np.einsum("mk,mk->m", e, e) for e in errors)
-            c = np.einsum("mk,mk->m", *errors)
-            p, q = (np.einsum("mk,mk->m", residual, e) for e in errors)
-            det = a * b - c**2
-            square = square - (b * p**2 - 2.0 * c * p * q + a * q**2) / det
-            log_det = log_det + np.log(det)
-        power = 0.5 * (self.degrees + residual.shape[1])
-        return np.asarray(
-            -0.5 * log_det - power * np.log1p(square / self.degrees), dtype=np.float64
-        )
-
-
 def healthy_alone(frame: Frame, prior: float) -> Hypothesis:
     """Return the hypothesis of no fault."""
     return Hypothesis((), float(frame.log(frame.y[None, :])[0]), prior)
@@ -163,52 +83,98 @@ def _somewhere(frame: Frame, wide: float) -> float:
     Of each number of features only the best set counts, found one after the other: less than the
     sum over all sets, so something else is never favoured.
     """
-    count, power = len(frame.y), 0.5 * (frame.degrees + len(frame.y))
-    y, log_det = frame.y.copy(), frame.log_det
-    moved = frame.root * (wide * np.sqrt(np.diag(frame.covariance)))
-    free, logs, sets = np.ones(count, dtype=np.bool_), [], 0.0
-    for n in range(1, min(count, _FEW) + 1):
-        norm = 1.0 + np.sum(moved**2, axis=0)
-        square = float(y @ y) - (y @ moved) ** 2 / norm
-        log = -0.5 * (log_det + np.log(norm)) - power * np.log1p(square / frame.degrees)
-        at = int(np.argmax(np.where(free, log, -np.inf)))
-        sets += float(np.log((count - n + 1) / n))
-        logs.append(float(log[at]) - n * np.log(2.0) - sets)
-        # Whitened again, with this one's deviation in the covariance.
-        way, size = moved[:, at].copy(), float(norm[at])
-        share = (1.0 / np.sqrt(size) - 1.0) / (size - 1.0)
-        y, moved = y + share * way * (way @ y), moved + share * np.outer(way, way @ moved)
-        log_det, free[at] = log_det + float(np.log(size)), False
-    return float(np.logaddexp.reduce(logs))
+    std = wide * np.sqrt(np.diag(frame.covariance))
+    steps = enumerate(greedy(frame, frame.y, std, _FEW), 1)
+    return float(np.logaddexp.reduce([log - n * np.log(2.0) - sets for n, (_, log, sets) in steps]))
 
 
 def one_fault(frame: Frame, c: CandidateFault, prior: float) -> Hypothesis:
     """Return the hypothesis of one fault."""
     at, local = 0.0, frame
     for _ in range(2):
-        grid, moved = local.line(c)
-        at = float(grid[int(np.argmax(local.log(local.y - moved, c.error * moved)))])
+        at = _best_of(local, c)
         local = frame.loosened([(c, at)])
+    plain = _one(local, c, at, prior)
+    looser = _with_strays(frame, local, [c], [at])
+    if looser is None:
+        return plain
+    other = _one(looser[0], c, _best_of(looser[0], c), prior, looser[1])
+    return max(plain, other, key=lambda h: h.evidence)
+
+
+def _best_of(frame: Frame, c: CandidateFault) -> float:
+    """Severity of the greatest density on the line of the whole range."""
+    grid, moved = frame.line(c)
+    return float(grid[int(np.argmax(frame.log(frame.y - moved, c.error * moved)))])
+
+
+def _one(local: Frame, c: CandidateFault, at: float, prior: float, rare: float = 0.0) -> Hypothesis:
+    """Integrate about a severity; `rare` is the log prior of what else is assumed.
+
+    Where the logs hardly tell the sign, about the best one of the other sign, too.
+    """
     fine = _around(at, _joint(local, [c], [at])[0], c, _FINE)
+    mirrored = _other_sign(local, c, at)
+    if mirrored is not None:
+        other = _around(mirrored, _joint(local, [c], [mirrored])[0], c, _FINE)
+        fine = np.unique(np.concatenate((fine, other)))
     moved = local.shift(c.key, fine)
     log = local.log(local.y - moved, c.error * moved)
     top = float(log.max())
     mass = np.exp(log - top) * np.gradient(fine) * prior_density(c, fine)
     total = float(mass.sum())
-    evidence = top + float(np.log(total))
+    evidence = top + float(np.log(total)) + rare
     best = float(fine[int(np.argmax(log))])
     return Hypothesis((c.key,), evidence, prior, (fine,), (mass / total,), (best,))
+
+
+def _other_sign(frame: Frame, c: CandidateFault, at: float) -> float | None:
+    """Best severity of the other sign, where it is not much less likely."""
+    if c.low >= 0.0 or at == 0.0:
+        return None
+    grid, moved = frame.line(c)
+    log = frame.log(frame.y - moved, c.error * moved)
+    across = np.where(grid * at < 0.0, log, -np.inf)
+    k = int(np.argmax(across))
+    inside = 0 < k < len(grid) - 1 and abs(grid[k]) > SMALL * abs(at)
+    return float(grid[k]) if inside and across[k] > log.max() - _NEAR else None
+
+
+def _with_strays(
+    frame: Frame, local: Frame, faults: Sequence[CandidateFault], at: Sequence[float]
+) -> tuple[Frame, float] | None:
+    """Return the local frame with strays of faults at these severities, and their log prior."""
+    pairs = list(zip(faults, at, strict=True))
+    wide = stray_of(frame.covariance, [frame.raw(c.key, np.array([b]))[0] for c, b in pairs])
+    left = local.y - sum(local.shift(c.key, np.array([b]))[0] for c, b in pairs)
+    return local.strayed(left, wide)
 
 
 def two_faults(
     frame: Frame, pair: tuple[CandidateFault, CandidateFault], prior: float
 ) -> Hypothesis:
     """Return the hypothesis of two faults; their shifts add."""
-    first, second = pair
     at = _start(frame, pair)
     local = frame.loosened(list(zip(pair, at, strict=True)))
     at = _along(local, pair, at)
     local = frame.loosened(list(zip(pair, at, strict=True)))
+    plain = _two(local, pair, at, prior)
+    looser = _with_strays(frame, local, pair, at)
+    if looser is None:
+        return plain
+    other = _two(looser[0], pair, _along(looser[0], pair, at), prior, looser[1])
+    return max(plain, other, key=lambda h: h.evidence)
+
+
+def _two(
+    local: Frame,
+    pair: tuple[CandidateFault, CandidateFault],
+    at: tuple[float, float],
+    prior: float,
+    rare: float = 0.0,
+) -> Hypothesis:
+    """Integrate about two severities."""
+    first, second = pair
     widths = _joint(local, pair, at)
     grids = [_around(b, 1.5 * w, c, _PAIR) for b, w, c in zip(at, widths, pair, strict=True)]
     log = _of_both(local, pair, local.shift(first.key, grids[0]), local.shift(second.key, grids[1]))
@@ -219,7 +185,7 @@ def two_faults(
     peak = np.unravel_index(int(np.argmax(log)), log.shape)
     return Hypothesis(
         (first.key, second.key),
-        top + float(np.log(total)),
+        top + float(np.log(total)) + rare,
         prior,
         tuple(grids),
         (mass.sum(axis=1) / total, mass.sum(axis=0) / total),

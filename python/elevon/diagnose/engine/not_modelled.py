@@ -51,7 +51,6 @@ _NOT_MODELLED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("chipped_tooth", ("gear",), "a step once a turn of a wheel, which no feature follows: "
      "not seen, or named tooth_wear@gear or backlash@transmission"),
     ("offset", ("sensor.encoder",), "no test looks at absolute positions"),
-    ("offset", ("sensor.resolver",), _ANGLE),
     ("mismatch", ("sensor.resolver",), _ANGLE),
     ("quadrature", ("sensor.resolver",), _ANGLE),
     ("channel_offset", ("sensor.resolver.sine", "sensor.resolver.cosine"), _ANGLE),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector
@@ -104,6 +107,13 @@ class Reading(ABC):
     @abstractmethod
     def digest(self) -> bytes:
         """Of all that its model runs depend on."""
+
+    def key(self) -> bytes:
+        """Of what was recorded: an order of logs that no caller chose."""
+        out = hashlib.sha256(np.ascontiguousarray(self.log.time).tobytes())
+        for role in sorted(self.log):
+            out.update(role.encode() + np.ascontiguousarray(self.log[role]).tobytes())
+        return out.digest()
 
     @abstractmethod
     def outcomes(self, units: Sequence[ReplayUnit]) -> Iterator[FeatureVector]:

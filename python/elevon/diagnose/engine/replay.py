@@ -11,7 +11,7 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import SEEN
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.reading import Reading, ReplayUnit
-from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
+from elevon.diagnose.engine.table import Feature, FeatureTable, FeatureVector, deviations
 from elevon.experiment import Variant
 
 _MOST = 1e4  # least deviations that a fault moves a number by: beyond it nothing more is learnt
@@ -197,8 +197,13 @@ def _moved_by(rows: Floats, healthy: FeatureVector, table: FeatureTable) -> Floa
     out = rows - healthy.values
     sizes = [k for k, f in enumerate(records) if f.kind == "size"]
     out[:, sizes] = np.sqrt(np.maximum(rows[:, sizes] ** 2 - healthy.values[sizes] ** 2, 0.0))
-    most = _MOST * deviations(records, healthy.values, "repeats")
-    return np.clip(out, -most, most)
+    return bounded(out, records, healthy.values)
+
+
+def bounded(moved: Floats, records: Sequence[Feature], values: Floats) -> Floats:
+    """Limit how far features are moved, shape (..., k): of logs and of runs alike."""
+    most = _MOST * deviations(records, values, "repeats")
+    return np.clip(moved, -most, most)
 
 
 def _known_part(c: CandidateFault, full: Floats, names: Sequence[str]) -> tuple[Floats, Floats]:

@@ -35,6 +35,9 @@ class Feature:
     pooled : float
         Where above zero, it deviates from the model by one share in all tests of a unit, and that
         share deviates by so much between tests.
+    constant : bool
+        Whether it is a number of the drive or of a sensor, the same whatever is commanded: what
+        two model runs differ by there is rounding.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Feature:
     kind: Literal["", "size", "share"] = ""
     least: float = 0.0
     pooled: float = 0.0
+    constant: bool = False
 
 
 FeatureTable = Mapping[str, Feature]

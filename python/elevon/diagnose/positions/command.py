@@ -68,7 +68,8 @@ def noted_command(log: Log, limit: float) -> NotedWaveform | None:
     note = log.note
     if note is None or not log.has("output_position") or note.waveform not in ("sine", "chirp"):
         return None
-    # A sample beside one at the limit may be the mean of both.
+    # A drive may have another limit than stated; a sample beside one at it may be the mean of both.
+    limit = min(limit, float(np.nanmax(np.abs(log.speed_ref))))
     cut = np.pad(np.abs(log.speed_ref) >= 0.999 * limit, 1)
     inside = log.good & ~(cut[:-2] | cut[1:-1] | cut[2:]) & np.isfinite(log.output)
     known = note.parameters

@@ -1,0 +1,262 @@
+"""Logs of foreign units, made, read and diagnosed as a user does: healthy, faults, unknowns."""
+
+from __future__ import annotations
+
+import time as clock
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elevon.diagnose.by_model import reading_of
+from elevon.diagnose.engine.candidates import candidates_of
+from elevon.diagnose.engine.case import case_of
+from elevon.diagnose.engine.diagnosis import answer_of
+from elevon.errors import ElevonWarning, InputError
+from elevon.progress import Progress
+from elevon.threads import one_blas_thread
+from studies.common import Row
+from studies.independent.bench import CAUSES, RATES, TESTS, Cause, Unit, injected, units, written
+from studies.side_by_side import side_by_side
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.diagnose.engine.answer import Diagnosis
+    from elevon.diagnose.engine.reading import Reading
+    from elevon.logs.log import Log
+    from studies.independent.result import IndependentResult
+
+_RATE = 0.05  # of false alarms that is set
+_BEYOND = 5.0  # deviations of the unit's healthy days, of one feature: a cause has moved the log
+#: Actuators whose logs the switching model makes, for want of another program: test of each.
+SWITCHING = (("nasa-ballscrew", "sine-opposing"), ("pisa-landing-gear", "extension-nominal"))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much is judged.
+
+    Attributes
+    ----------
+    units, healthy : int
+        Units of the foreign bench; healthy logs of each in each of three tests.
+    baselines : tuple of int
+        Numbers of baselines; without one a sixth of the logs is diagnosed.
+    switching : int
+        Healthy logs of each other actuator, by the switching model.
+    seed : int
+        Of everything.
+    """
+
+    units: int
+    healthy: int
+    switching: int
+    seed: int
+    baselines: tuple[int, ...] = (0, 1, 3)
+
+
+@dataclass(frozen=True)
+class Judged(Row):
+    """One answer.
+
+    Attributes
+    ----------
+    program : str
+        That made the log: ``foreign``, or the actuator of the switching model.
+    what : str
+        ``healthy``, ``fault`` or ``cause``.
+    name, test : str
+        Of the fault or cause; of the test.
+    unit, rate, baselines : int, float, int
+        Number of the unit, Hz of its logs, baselines.
+    status, best : str, tuple of str
+        Of the answer; ``refused`` where the log was.
+    p_other, most : float
+        Probability of no candidate, and of the most probable candidate.
+    moved : bool
+        Whether the log is beyond the unit's healthy days.
+    covered : bool
+        Whether the true severity lies in its interval.
+    seconds : float
+        Processor time.
+    """
+
+    program: str
+    what: str
+    name: str
+    test: str
+    unit: int
+    rate: float
+    baselines: int
+    status: str
+    best: tuple[str, ...]
+    p_other: float
+    most: float
+    moved: bool
+    covered: bool
+    seconds: float
+
+
+def study_independent(
+    plan: Plan, *, processes: int | None = None, progress: Progress | None = None
+) -> IndependentResult:
+    """Judge diagnosis on units, days and causes of another program.
+
+    Raises
+    ------
+    InputError
+        Nothing to judge.
+    Interrupted
+        `progress` returned False.
+    """
+    from studies.independent.result import IndependentResult
+
+    if plan.units < 1 or plan.healthy < 4:
+        raise InputError("at least 1 unit and 4 healthy logs of each test are needed")
+    begin = clock.perf_counter()
+    calls = {f"unit {u.number}": partial(_of_unit, u, plan) for u in units(plan.seed, plan.units)}
+    for name, test in SWITCHING if plan.switching else ():
+        calls[name] = partial(_switching, name, test, plan)  # type: ignore[assignment]
+    rows: dict[str, list[Judged]] = dict(
+        side_by_side(calls, processes=processes, progress=progress)
+    )
+    judged = tuple(row for name in calls for row in rows[name])
+    return IndependentResult(judged, plan, clock.perf_counter() - begin)
+
+
+@one_blas_thread()
+def _of_unit(unit: Unit, plan: Plan) -> list[Judged]:
+    """Calibrate a unit on a log of each test, then judge its other days."""
+    from elevon import calibrate
+
+    out: list[Judged] = []
+    with TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", ElevonWarning)
+        make = _Maker(unit, Path(folder), plan.seed).log
+        first = [make(test, 0) for test in TESTS]
+        actuator = calibrate(first, "torino-rotary").actuator
+        for k, test in enumerate(TESTS):
+            base = [reading_of(make(test, 1 + n), actuator) for n in range(max(plan.baselines))]
+            judge = _Judge(unit, test, actuator, base).of
+            days = [make(test, 100 + n) for n in range(plan.healthy)]
+            for n, log in enumerate(days):
+                counts = [b for b in plan.baselines if b or n < plan.healthy // 6]
+                out += [judge("healthy", "", log, b) for b in counts]
+            usual = _usual([*base, *(reading_of(log, actuator) for log in days)])
+            for n, fault in enumerate(injected(unit)):
+                if n % 2 == (unit.number + k) % 2:
+                    log = make(test, 1000 + n, fault.cause)
+                    out.append(judge("fault", fault.key, log, 1, severity=fault.severity))
+            for n, cause in enumerate(CAUSES):
+                if (n + unit.number * len(TESTS) + k) % 6 == 0:
+                    log = make(test, 2000 + n, cause)
+                    out.append(judge("cause", cause.name, log, 1, usual=usual))
+    return out
+
+
+@dataclass(frozen=True)
+class _Maker:
+    """Makes logs of a unit in a folder."""
+
+    unit: Unit
+    folder: Path
+    seed: int
+
+    def log(self, test: str, number: int, cause: Cause | None = None) -> Log:
+        """Make one log, and read it as a user does."""
+        from elevon.logs.read import read_logs
+
+        run = 10_000 * (100 * self.seed + self.unit.number) + 3000 * list(TESTS).index(test)
+        place = self.folder / str(number)
+        return read_logs([written(self.unit, test, place, run + number, cause)])[0]
+
+
+def _usual(items: Sequence[Reading]) -> dict[str, tuple[float, float]]:
+    """Mean of each feature over healthy days, and the deviation of another day from it."""
+    names = [n for n in items[0].features.names if all(n in i.features.names for i in items)]
+    values = np.array([item.features.only(names).values for item in items])
+    wide = values.std(axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / len(items))
+    return dict(zip(names, zip(values.mean(axis=0), wide, strict=True), strict=True))
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """Diagnoses logs of one unit in one test."""
+
+    unit: Unit
+    test: str
+    actuator: Actuator
+    base: Sequence[Reading]
+
+    def of(
+        self,
+        what: str,
+        name: str,
+        log: Log,
+        count: int,
+        *,
+        usual: dict[str, tuple[float, float]] | None = None,
+        severity: float | None = None,
+    ) -> Judged:
+        """Return the answer to a log with so many baselines."""
+        begin = clock.process_time()
+        row = Judged("foreign", what, name, self.test, self.unit.number, self.unit.rate, count,
+                     "refused", (), 0.0, 0.0, True, False, 0.0)  # fmt: skip
+        try:
+            item = reading_of(log, self.actuator)
+            answer = _answer(item, self.actuator, self.base[:count])
+        except InputError:
+            return row
+        ends = [c.interval for c in answer.faults if f"{c.kind}@{c.place}" == name]
+        return replace(
+            row,
+            status=answer.status,
+            best=answer.best,
+            p_other=answer.p_other,
+            most=max([c.probability for c in answer.faults], default=0.0),
+            moved=usual is not None and _far(item, usual) > _BEYOND,
+            covered=severity is not None and any(low <= severity <= high for low, high in ends),
+            seconds=clock.process_time() - begin,
+        )
+
+
+def _far(item: Reading, usual: dict[str, tuple[float, float]]) -> float:
+    """Largest deviation of a feature from the unit's healthy days, in theirs."""
+    seen = zip(item.features.names, item.features.values.tolist(), strict=True)
+    return max(abs(v - usual[n][0]) / usual[n][1] for n, v in seen if n in usual)
+
+
+def _answer(item: Reading, actuator: Actuator, base: Sequence[Reading]) -> Diagnosis:
+    candidates = candidates_of(actuator)
+    return answer_of([case_of(item, candidates, base)], candidates, _RATE)
+
+
+@one_blas_thread()
+def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
+    """Healthy days of another actuator, made by the package's own switching model."""
+    from elevon import Actuator
+    from studies.fault_limits.standard import Day, day_logs, standard_tests
+
+    actuator = Actuator.load(name)
+    test = next(t for t in standard_tests(actuator) if t.name == title)
+    most = max(plan.baselines)
+    days = [Day((), 100_000 * plan.seed + n) for n in range(most + plan.switching)]
+    unit = Unit(0, None, None, RATES[0])  # type: ignore[arg-type]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ElevonWarning)
+        logs = day_logs(actuator, test, days, "high")
+        base = [replace(log, name=f"baseline {k}") for k, log in enumerate(logs[:most])]
+        first = [reading_of(log, actuator) for log in base]
+        judge = _Judge(unit, title, actuator, first).of
+        rows = [
+            judge("healthy", "", log, count)
+            for log in logs[most:]
+            for count in plan.baselines
+            if count
+        ]
+    return [replace(row, program=name) for row in rows]

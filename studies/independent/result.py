@@ -1,0 +1,123 @@
+"""What logs of another program show of diagnosis: shares with intervals, and what must hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from elevon.diagnose.modelfree.scores import share_interval
+from elevon.report.checks import Check, verdict
+from studies.independent.campaign import Judged, Plan
+
+_ALARMS = ("faulty", "unknown_fault")
+_GATE = "model_does_not_fit"
+_SET, _UNKNOWN, _NAMED, _ISOLATED, _SECOND, _SECONDS = 0.05, 0.8, 0.9, 0.9, 0.03, 0.5
+_COVERED = (0.85, 0.95)
+
+
+@dataclass(frozen=True)
+class IndependentResult:
+    """All answers.
+
+    Attributes
+    ----------
+    judged : tuple of Judged
+        One a log and number of baselines.
+    plan : Plan
+        Of the study.
+    seconds : float
+        Time it took.
+    """
+
+    judged: tuple[Judged, ...]
+    plan: Plan
+    seconds: float = field(compare=False)
+
+    def of(self, what: str, **chosen: object) -> list[Judged]:
+        """Return answers of a kind, with these attributes."""
+        pairs = chosen.items()
+        return [
+            r for r in self.judged if r.what == what and all(getattr(r, k) == v for k, v in pairs)
+        ]
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """Counts with their 95 % intervals."""
+        out = []
+        for program in dict.fromkeys(r.program for r in self.judged):
+            for count in self.plan.baselines:
+                logs = self.of("healthy", program=program, baselines=count)
+                if logs:
+                    text = f"{program}, healthy, {count} baselines"
+                    out.append(_row(f"{text}: alarms", [r.status in _ALARMS for r in logs]))
+                    out.append(_row(f"{text}: gated", [r.status == _GATE for r in logs]))
+        moved = [r for r in self.of("cause") if r.moved]
+        out.append(_row("causes that move the log: unknown", [_unknown(r) for r in moved]))
+        out.append(_row("the same: called healthy", [r.status == "healthy" for r in moved]))
+        out.append(_row("the same: a candidate above 0.9", [r.most > _NAMED for r in moved]))
+        unmoved = [r for r in self.of("cause") if not r.moved]
+        out.append(
+            _row("causes that do not move it: alarms", [r.status in _ALARMS for r in unmoved])
+        )
+        faults = self.of("fault")
+        out.append(_row("single faults isolated", [r.best == (r.name,) for r in faults]))
+        right = [r for r in faults if r.name in r.best]
+        out.append(_row("their intervals hold the severity", [r.covered for r in right]))
+        out.append(_row("a wrong second fault", [len(r.best) > 1 for r in faults]))
+        return out
+
+    @property
+    def causes(self) -> list[dict[str, Any]]:
+        """Each cause that is no candidate."""
+        keys = ("name", "test", "unit", "rate", "moved", "status", "best", "p_other", "most")
+        return [{key: getattr(r, key) for key in keys} for r in self.of("cause")]
+
+    @property
+    def checks(self) -> list[Check]:
+        """What must hold: an interval's end where a share is set, else the share."""
+        known = {row["what"]: row for row in self.rows}
+        out = []
+        for name, row in known.items():
+            if name.endswith(("alarms", "gated")) and "healthy" in name:
+                out.append(Check(f"{name}: lower end of 95 %", row["interval"][0], _SET))
+        share = {name: row["share"] for name, row in known.items()}
+        low, high = known["their intervals hold the severity"]["interval"]
+        seconds = [r.seconds for r in self.judged if r.baselines and r.program == "foreign"]
+        out += [
+            Check("unknown of causes that move the log",
+                  share["causes that move the log: unknown"], _UNKNOWN, at_least=True),
+            Check("a candidate above 0.9", share["the same: a candidate above 0.9"], 0.0),
+            Check("single faults isolated", share["single faults isolated"], _ISOLATED,
+                  at_least=True),
+            Check("coverage: upper end of 95 %", high, _COVERED[0], at_least=True),
+            Check("coverage: lower end of 95 %", low, _COVERED[1]),
+            Check("a wrong second fault", share["a wrong second fault"], _SECOND),
+            Check("median processor time with a baseline [s]", float(np.median(seconds)), _SECONDS),
+        ]  # fmt: skip
+        return out
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        return {
+            **verdict(self.checks),
+            "seed": self.plan.seed,
+            "rows": self.rows,
+            "causes": self.causes,
+            "judged": [row.to_dict() for row in self.judged],
+            "seconds": self.seconds,
+        }
+
+
+def _unknown(row: Judged) -> bool:
+    """Whether an answer says that it does not know the cause; a refused log is none."""
+    return row.status in ("unknown_fault", _GATE, "refused") or row.p_other >= 0.5
+
+
+def _row(what: str, hits: Sequence[bool]) -> dict[str, Any]:
+    count, of = sum(hits), len(hits)
+    share = count / of if of else float("nan")
+    return {"what": what, "hits": count, "logs": of, "share": share,
+            "interval": share_interval(count, of)}  # fmt: skip
