@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -54,46 +55,43 @@ def opened(path: Path) -> Iterator[object]:
         raise FormatError(f"{path}: damaged HDF5 file: {quoted(str(error))}") from error
 
 
-def datasets(file: object, notes: list[str]) -> Iterator[tuple[str, object]]:
+def datasets(file: object) -> Iterator[tuple[str, object]]:
     """Yield path and dataset of everything in a file, over hard links only.
+
+    Of what is passed over, such as a link, the reason stands in the dataset's place.
 
     Parameters
     ----------
     file : h5py.File
         From `opened`.
-    notes : list of str
-        What is passed over, and why, is added here.
 
     Raises
     ------
     FormatError
         More items than any log has.
     """
-    yield from _walk(file, "", 0, notes, [0])
+    yield from _walk(file, "", 0, count())
 
 
-def _walk(
-    group: Any, prefix: str, depth: int, notes: list[str], count: list[int]
-) -> Iterator[tuple[str, Any]]:
+def _walk(group: Any, prefix: str, depth: int, items: Iterator[int]) -> Iterator[tuple[str, Any]]:
     import h5py
 
     for name in group:
-        count[0] += 1
-        if count[0] > _MOST_ITEMS:
+        if next(items) >= _MOST_ITEMS:
             raise FormatError(f"{group.file.filename}: more than {_MOST_ITEMS} items")
         path = f"{prefix}{name}"
         if path.startswith("#"):
             continue  # MATLAB's own bookkeeping (#refs#, #subsystem#)
         if not _is_own(group, name):
-            notes.append(f"{quoted(path)} passed over: a link")
+            yield path, "a link"
             continue
         item = group[name]
         if isinstance(item, h5py.Dataset):
             yield path, item
         elif isinstance(item, h5py.Group) and depth < _DEEPEST:
-            yield from _walk(item, f"{path}/", depth + 1, notes, count)
+            yield from _walk(item, f"{path}/", depth + 1, items)
         else:
-            notes.append(f"{quoted(path)} passed over: nested too deep or not a dataset")
+            yield path, "nested too deep or not a dataset"
 
 
 def _is_own(group: Any, name: str) -> bool:

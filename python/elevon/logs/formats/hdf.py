@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.containers.hdf import array, datasets, opened, text_attribute
 from elevon.errors import quoted
@@ -46,10 +47,8 @@ def numeric_vectors(
     notes: list[str] = []
     with opened(path) as file:
         total = 0
-        for name, data in datasets(file, notes):
-            place = f"{path}, {quoted(name)}"
-            bound = _bound(limits, place, total, data)
-            values = array(data, "fiub", bound, also=signals_side_by_side)
+        for name, data in datasets(file):
+            values = data if isinstance(data, str) else _array(path, name, data, limits, total)
             if isinstance(values, str):
                 notes.append(f"{quoted(name)} passed over: {values}")
                 continue
@@ -61,6 +60,14 @@ def numeric_vectors(
             vectors.update(signals)
             units.update(dict.fromkeys(signals, unit) if unit else {})
     return vectors, units, notes
+
+
+def _array(
+    path: Path, name: str, data: object, limits: Limits, before: int
+) -> npt.NDArray[np.generic] | str:
+    """Return the numbers of a vector or a long matrix; of anything else say why not."""
+    bound = _bound(limits, f"{path}, {quoted(name)}", before, data)
+    return array(data, "fiub", bound, also=signals_side_by_side)
 
 
 def _bound(limits: Limits, place: str, before: int, data: Any) -> Callable[[int], None]:

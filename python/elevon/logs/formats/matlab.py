@@ -27,11 +27,10 @@ def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTabl
         Not a .mat file of version 5 or 7.3, damaged, or larger than the limits after expansion.
     """
     file = existing_file(path, limits)
-    notes: list[str] = []
     if is_hdf5(file):
         vectors, _, notes = numeric_vectors(file, limits)
         return table_of_vectors(str(file), vectors, {}, notes, file_format="mat 7.3", limits=limits)
-    vectors = _vectors(file, limits, notes)
+    vectors, notes = _vectors(file, limits)
     return table_of_vectors(str(file), vectors, {}, notes, file_format="mat 5", limits=limits)
 
 
@@ -48,23 +47,28 @@ def _bounded(path: Path, limits: Limits) -> Generator[Variable, None, None]:
     return variables(path, lambda size: limits.check_bytes(str(path), size))
 
 
-def _vectors(path: Path, limits: Limits, notes: list[str]) -> dict[str, FloatArray]:
+def _vectors(path: Path, limits: Limits) -> tuple[dict[str, FloatArray], list[str]]:
     """Return the numeric vectors of a version 5 file; those inside a structure as ``name/field``.
 
-    Columns of a long matrix are vectors. What is passed over is added to the notes: cells, objects,
-    text, complex numbers.
+    Columns of a long matrix are vectors. The notes name what is passed over: cells, objects, text,
+    complex numbers.
     """
     vectors: dict[str, FloatArray] = {}
+    notes = []
     total = 0
     for variable in _bounded(path, limits):
         for label, item in _members(path, variable):
-            for name, vector in _columns(label, item, notes).items():
+            columns = _columns(label, item)
+            if isinstance(columns, str):
+                notes.append(f"{quoted(label)} passed over: {columns}")
+                continue
+            for name, vector in columns.items():
                 if name in vectors:
                     raise FormatError(f"{path}: two variables are named {quoted(name)}")
                 total += len(vector)
                 limits.check_shape(str(path), total, 1)
                 vectors[name] = vector
-    return vectors
+    return vectors, notes
 
 
 def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
@@ -80,8 +84,8 @@ def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
         yield f"{variable.name}/{field.name}", field
 
 
-def _columns(label: str, item: Variable, notes: list[str]) -> dict[str, FloatArray]:
-    """Decode a vector, or the columns of a long matrix; none, with a note, for anything else."""
+def _columns(label: str, item: Variable) -> dict[str, FloatArray] | str:
+    """Decode a vector, or the columns of a long matrix; of anything else say what it is."""
     reason = "" if item.kind == "numbers" else item.kind
     if not reason and item.is_complex:
         reason = "complex numbers"
@@ -89,7 +93,4 @@ def _columns(label: str, item: Variable, notes: list[str]) -> dict[str, FloatArr
         return columns_of(label, item.numbers().reshape(item.shape, order="F"))
     if not reason and sum(length != 1 for length in item.shape) > 1:
         reason = f"neither a vector nor signals side by side, shape {item.shape}"
-    if reason:
-        notes.append(f"{quoted(label)} passed over: {reason}")
-        return {}
-    return {label: item.numbers()}
+    return reason or {label: item.numbers()}
