@@ -15,7 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 RUNS = ROOT / "docs" / "evidence" / "runs"
 #: Published cases that need no foreign data and take at most some minutes.
 CASES = (
-    "torino-backlash", "torino-compliance", "low-fidelity", "nasa-current", "nasa-thermal",
+    "torino-backlash", "torino-compliance", "torino-validation", "torino-loaded", "torino-drops",
+    "torino-fmeca", "low-fidelity", "nasa-current", "nasa-thermal",
     "pisa-functional", "pisa-friction", "pisa-hydraulic",
 )  # fmt: skip
 

@@ -64,12 +64,24 @@ def fmeca(healthy="healthy", **wrong):
     return FmecaResult([replace(rows[0], **wrong), *rows[1:]], healthy, 0, "").checks
 
 
+# --- torino-control ------------------------------------------------------------------------------
+def control(factor=1.0, speed=24.19, end=None):
+    """Return the checks of a locus whose roots are scaled, or end elsewhere, and of a speed."""
+    from elevon.reproduce.torino_bench.control import ControlResult, root_locus
+
+    roots = factor * root_locus()
+    if end is not None:
+        roots[-1] = end
+    return ControlResult([], speed, 24.19, "", roots).checks
+
+
 #: Case to the checks without an error.
 BENCH_GOOD = {
     "torino-validation": bench_and_model,
     "torino-loaded": campaign,
     "torino-drops": drops,
     "torino-fmeca": fmeca,
+    "torino-control": control,
 }
 
 #: Case and check to the checks with one.
@@ -105,6 +117,12 @@ BENCH_PLANTED = {
     ("torino-drops", "angle lost, model less bench"): partial(drops, loss_error_deg=0.01),
     ("torino-drops", "error of a rigid transmission over that of the model"):
         partial(drops, rigid_error_deg=0.004),
+    ("torino-control", "root at no gain less the filter's pole"): partial(control, factor=1.001),
+    ("torino-control", "root at the largest gain, over the pole"): partial(control, end=-200.0),
+    ("torino-control", "least step of the root towards zero"): partial(control, factor=-1.0),
+    ("torino-control", "no-load speed less the drive's limit"): partial(control, speed=25.0),
+    ("torino-control", "no-load speed, secondary controls that assist"):
+        partial(control, speed=14.0),
     ("torino-fmeca", "least change of a line"): partial(fmeca, change_percent=0.1),
     ("torino-fmeca", "faults called healthy"): partial(fmeca, seen="called healthy"),
     ("torino-fmeca", "faults named as another"): partial(fmeca, seen="another is named"),

@@ -193,6 +193,14 @@ CASES = (
         page=_R + "torino_bench.fmeca_page:fmeca_page",
     ),
     PublishedCase(
+        "torino-control",
+        "Draw the root locus of the derivative branch; hold the no-load speed to what is required.",
+        "one run",
+        _R + "torino_bench.control:reproduce_control",
+        ("requirement", "required_deg_s", "speed_deg_s", "met"),
+        page=_R + "torino_bench.control_page:control_page",
+    ),
+    PublishedCase(
         "low-fidelity",
         "Compare the reduced-order model with the switching one in the three cases it must pass.",
         "seven runs",
