@@ -59,6 +59,9 @@ _STEADY, _FREE, _ROUGH = 0.06, 0.2, 0.5
 rows whose rate wanders. ASSUMED."""
 _ROUGH_PATH = 0.01
 """Variance of a wandering row's path over a life, of the square of its damage: a tenth. ASSUMED."""
+_LONGEST_LIFE = 1e6
+"""Repetitions of a life by growth of no physics, at most: a law that says nothing grows (a winding
+that stays cold) does not hold it back. ASSUMED: more than any unit is used for."""
 _ROUGH_SHARE = 0.04
 """Prior share of each row that wanders."""
 
@@ -146,6 +149,7 @@ def shapes_of(law: Law, rate: Callable[[Floats, int], Floats], limit: float) -> 
         below = level < start
         seed = start / (limit - start) if start > 0.0 else _SEED
         first = float(np.interp(start, level, member_clocks[0]))
+        life = min(life, _LONGEST_LIFE)
         prior = [p * (1.0 - sum(share for share, _ in _FAMILIES.values())) for p in prior]
         for name, (share, forms) in _FAMILIES.items():
             for form in forms:
