@@ -150,7 +150,8 @@ def speed_control(ctx: Context) -> None:
         inside = _free(log, "current_ref", value("control.current_limit"))
         torque = value("control.torque_constant") * log["current_ref"]
         parts += _stretched(log, torque, inside)
-    fit = _speed_loop(parts, value("control.sample_time"))
+    # A servo's integral takes the error of a tick after it: half a tick less than the integral.
+    fit = _speed_loop(parts, -value("control.sample_time"))
     if fit is None:
         ctx.add({}, dict.fromkeys(paths, "needs the set points of speed and current"))
     elif not (fit["gain"] > 0.0 and fit["integral"] > 0.0):
