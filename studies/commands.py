@@ -117,6 +117,18 @@ def independent(
     return study_independent(plan, processes=processes, progress=progress)
 
 
+def _save_independent(result: Any, options: Options) -> None:
+    from elevon.files import write_text
+    from studies.independent.table import independent_table
+
+    if options["table"] is not None:
+        names = ("units", "healthy", "switching", "seed")
+        numbers = " ".join(f"--{name} {options[name]}" for name in names)
+        text = independent_table(result, f"python -m studies independent {numbers}")
+        write_text(options["table"], text, force=options["force"])
+        say(f"table: {options['table']}")
+
+
 def _save_table(result: Any, options: Options) -> None:
     from elevon.files import write_text
     from studies.fault_limits.table import limits_table
@@ -207,7 +219,10 @@ _STUDIES = (
             "healthy": (_HEALTHY, 17),
             "switching": (_SWITCHING, 60),
             "processes": (_PROCESSES, None),
+            "table": (_TABLE, None),
         },
+        prepare=lambda options: check_file(options["table"], options),
+        finish=_save_independent,
     ),
     PublishedCase(
         "monitor-delay",

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import elevon
 from elevon import Actuator
 from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.candidates import CANDIDATES, chosen
@@ -206,6 +207,9 @@ def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
     document = json.loads(result.out)
     assert document["status"] == "faulty"
     assert document["faults"][0]["kind"] == "backlash"
+    assert document["parameter_hash"] == Actuator.load("torino-rotary").hash
+    assert document["made_by"] == elevon.__version__
+    assert [name.endswith(NAME) for name in document["baselines"]] == [True]
     assert "Backlash has grown by" in page.read_text()
     assert "what speaks against each" in page.read_text()
     assert "Signals against the healthy model" in page.read_text()

@@ -75,9 +75,8 @@ def diagnose(
     """
     unit = as_actuator(actuator)
     if method == "learned":
-        return replace(
-            _learned(logs, unit, baselines, model, faults=faults, rate=false_alarm), method=method
-        )
+        answer = _learned(logs, unit, baselines, model, faults=faults, rate=false_alarm)
+        return _signed(answer, unit, (), method)
     if model is not None:
         raise InputError("--model: serves --method learned")
     run = _method(method, surrogate, spread)
@@ -88,7 +87,18 @@ def diagnose(
     data, healthy = as_logs(logs), _healthy(baselines)
     result = run(data, unit, baselines=healthy, faults=faults, false_alarm=false_alarm)
     draw = partial(traces_of, data, unit, result)
-    return replace(result, actuator=unit.name, method=method, draw=draw)
+    return replace(_signed(result, unit, healthy, method), draw=draw)
+
+
+def _signed(result: Diagnosis, unit: Actuator, baselines: Sequence[Log], method: str) -> Diagnosis:
+    """Return an answer with what it stands on."""
+    from elevon import __version__
+
+    names = tuple(log.name for log in baselines)
+    return replace(
+        result, actuator=unit.name, parameter_hash=unit.hash, baselines=names,
+        made_by=__version__, method=method,
+    )  # fmt: skip
 
 
 def _learned(

@@ -186,8 +186,12 @@ class Diagnosis(Result):
         unknown.
     reason : Reason or None
         Why no cause is named.
-    actuator : str
-        Its name.
+    actuator, parameter_hash : str
+        Name of the actuator file, and the digits of its values.
+    baselines : tuple of str
+        Names of the healthy logs that were given.
+    made_by : str
+        Version of Elevon.
     method : str
         ``model``, ``surrogate`` or ``both``.
     draw : callable or None
@@ -213,6 +217,9 @@ class Diagnosis(Result):
     p_other: float = 0.0
     reason: Reason | None = None
     actuator: str = ""
+    parameter_hash: str = ""
+    baselines: tuple[str, ...] = ()
+    made_by: str = ""
     method: str = "model"
     draw: Annotated[Callable[[], Sequence[Traces]] | None, WORKING] = field(
         default=None, compare=False, repr=False

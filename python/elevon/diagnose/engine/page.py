@@ -60,6 +60,13 @@ def diagnosis_page(
     )
     for text in result.findings:
         limits.text(text)
+    report.provenance(
+        {
+            "Elevon": result.made_by,
+            "Actuator file": f"{result.actuator}, values {result.parameter_hash}",
+            "Baselines": ", ".join(result.baselines) or "none",
+        }
+    )
     return report
 
 
