@@ -101,6 +101,10 @@ def diagnose(
     candidates = chosen(faults, actuator)
     healthy = [reading_of(log, actuator) for log in baselines]
     cases = [case_of(reading_of(log, actuator), candidates, healthy, spread) for log in logs]
+    if spread is not None and not any(n in spread.features for c in cases for n in c.unit.names):
+        raise InputError(
+            f"--spread: it was learnt of {spread.actuator}; none of its features is in these logs"
+        )
     result = answer_of(cases, candidates, false_alarm, spread)
     if spread is not None:
         result = replace(result, findings=(*result.findings, spread.threshold_text(false_alarm)))
