@@ -22,6 +22,11 @@ def index_page(result: EveryCase, date: str | None) -> Report:
     report = Report("Published results, recomputed", f"Checks: {lead}.", date=date)
     for name, number in counts.items():
         report.fact(name, str(number))
+    wrong = [[row.case, row.check, row.verdict, row.reason] for row in result.rows
+             if row.verdict != "pass"]  # fmt: skip
+    if wrong:
+        columns = ("case", "check", "verdict", "reason")
+        report.section("Rows that do not pass").table(ReportTable(columns, wrong))
     for work in works():
         rows = [row for row in result.rows if row.paper == work.name]
         if rows:
