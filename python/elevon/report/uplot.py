@@ -120,7 +120,7 @@ def chart(
     )
 
 
-def figure(svg: str, panels: Sequence[Mapping[str, Any]], columns: int, caption: str) -> str:
+def figure(svg: str, panels: Sequence[Mapping[str, object]], columns: int, caption: str) -> str:
     """Return a figure whose drawing is replaced by charts of the same data where scripts run.
 
     Parameters
@@ -138,7 +138,7 @@ def figure(svg: str, panels: Sequence[Mapping[str, Any]], columns: int, caption:
 
 
 def _element(
-    tag: str, before: str, panels: Sequence[Mapping[str, Any]], columns: int, after: str
+    tag: str, before: str, panels: Sequence[Mapping[str, object]], columns: int, after: str
 ) -> str:
     data = json.dumps({"columns": columns, "panels": panels}, allow_nan=False)
     data = data.replace("<", "\\u003c")

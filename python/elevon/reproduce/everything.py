@@ -95,7 +95,7 @@ class EveryCase:
         """Return how many rows have a verdict."""
         return sum(row.verdict == verdict for row in self.rows)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return the JSON object: status, checks, rows, how many rows of each verdict."""
         import elevon
 
