@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.candidates import CandidateFault
 
 _LEAST = 200  # samples of a window that may be used
-_LEAD = 1.0  # s of a motion's beginning that are left out, as of a turning servo's
+_LEAD = 1.0  # s of a motion's beginning that are left out at least, as of a turning servo's
 _AWAY = 0.01  # of the command's range: beyond it the motion has begun
 _COMPLETE = 0.98  # of a channel's samples in a window: a bridged gap looks like a fault
 _RATE = 0.02  # relative difference of two sampling rates that are one
@@ -129,6 +129,11 @@ class RoleWindows(Windows):
             return _SHORT * float(np.diff(log.time[at]).min())
         return role_log(log, self.actuator).seconds - _LATER * log.duration
 
+    @property
+    def _lead(self) -> float:
+        """What is left out of a motion's beginning [s]: its first period is not like the others."""
+        return 0.0 if self._sequence else max(_LEAD, self.width)
+
     def ready(self, log: Log) -> Log:
         """Return a log as it is fed."""
         if not log.has("command"):
@@ -153,7 +158,7 @@ class RoleWindows(Windows):
         command, needed = day.roles.index("command"), day.at(*_NEEDED)
         if self._sequence:
             return ActionCutter(self.width, 0.0, float(self._action), command, needed)
-        return CommandCutter(self.width, _LEAD, _AWAY * self._range, command, needed)
+        return CommandCutter(self.width, self._lead, _AWAY * self._range, command, needed)
 
     def read(self, day: Day, window: CutWindow, *, any_motion: bool = False) -> FeatureVector | str:
         """Return the features of a window, or why it is not used."""
@@ -181,7 +186,7 @@ class RoleWindows(Windows):
         if day is None or window is None:
             raise InputError(
                 f"{self.baselines[0].name}: has no whole window of {self.width:g} s behind the "
-                f"first {0.0 if self._sequence else _LEAD:g} s of its motion"
+                f"first {self._lead:g} s of its motion"
             )
         # A window begins half a sample early, so that rounding decides nothing.
         log = stretch(self.baselines[0], 0.0, window.end + BEFORE)
