@@ -34,6 +34,8 @@ KINEMATIC = (
     "control.speed_limit",
 )
 _LEAST = 200  # samples inside the limit
+_EXACT = 1e-6  # of a limit: how near to it a set point that is held there stays
+_HOLDS = 20  # samples, the fewest
 _SMALL = 0.02  # RMS of the command's misfit over its spread, above which no waveform explains it
 
 
@@ -233,5 +235,12 @@ def speed_sensor(logs: Sequence[Log]) -> dict[str, tuple[float, float]] | None:
 
 def speed_limit(logs: Sequence[Log]) -> float | None:
     """Level at which the set point is held flat, where any log shows one [rad/s]."""
-    tops = [top for log in logs if math.isfinite(top := saturated_speed(log))]
+    tops = [
+        top for log in logs if math.isfinite(top := saturated_speed(log)) and _at_limit(log, top)
+    ]
     return max(tops) if tops else None
+
+
+def _at_limit(log: Log, top: float) -> bool:
+    """Whether a level is held, and not the round crest of a slow sine."""
+    return int((np.abs(log.speed_ref) > top * (1.0 - _EXACT)).sum()) >= _HOLDS

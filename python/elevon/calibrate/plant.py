@@ -196,7 +196,9 @@ def controller_estimates(
     """Turn the controller's law into gain and times."""
     extra = torque.relative if torque.tied else 0.0
     given = () if torque.measured and torque.tied else ("control.torque_constant",)
-    gain, integral = (law.of(lambda b, k=k: torque.believed * float(b[k])) for k in (0, 1))  # type: ignore[misc]
+    half = _half_tick(actuator)
+    gain = law.of(lambda b: torque.believed * float(b[0] + half * b[1]))
+    integral = law.of(lambda b: torque.believed * float(b[1]))
     gain, integral = (item.widened(extra * item.value) for item in (gain, integral))
     return [
         named(gain, "control.speed_gain", actuator, given=given),
@@ -208,6 +210,14 @@ def controller_estimates(
     ]  # fmt: skip
 
 
+def _half_tick(actuator: Actuator) -> float:
+    """Return by how much the drive's sum of errors is behind their integral [s].
+
+    The error of a tick is added after it: half a tick's worth is missing, as of the gain.
+    """
+    return 0.5 * float(actuator.parameters.value("control.sample_time"))
+
+
 def _times(actuator: Actuator, law: Regression, logs: str) -> list[Estimate]:
     """Integral and derivative time; zero where the logs show no such action."""
     value = actuator.parameters.value
@@ -215,7 +225,8 @@ def _times(actuator: Actuator, law: Regression, logs: str) -> list[Estimate]:
     paths = ("control.integral_time", "control.derivative_time")
     rows: list[Estimate] = []
     if law["integral"] > _SEEN * law.std("integral"):
-        rows.append(named(law.of(lambda b: float(b[0] / b[1])), paths[0], actuator))
+        half = _half_tick(actuator)
+        rows.append(named(law.of(lambda b: float(b[0] / b[1]) + half), paths[0], actuator))
     elif value(paths[0]) > 0.0:
         rows.append(named(Estimate(0.0, 0.0), paths[0], actuator, none.format("integral")))
     late = law.of(lambda b: float(b[2] / b[0]))
