@@ -92,15 +92,16 @@ def diagnose(
     """
     begin = clock.perf_counter()
     check_request(logs, false_alarm)
-    broken = diagnose_sensors(logs, baselines, false_alarm) if faults is None else None
+    healthy = [reading_of(log, actuator) for log in baselines]
+    items = [reading_of(log, actuator) for log in logs]
+    broken = None if faults else _broken(logs, items, baselines, healthy, false_alarm)
     if broken is not None:
         return replace(broken, seconds=clock.perf_counter() - begin)
     heard, notes = _heard(logs, actuator, faults, false_alarm, alone=not baselines)
     if heard is not None:
         return replace(heard, seconds=clock.perf_counter() - begin)
     candidates = chosen(faults, actuator)
-    healthy = [reading_of(log, actuator) for log in baselines]
-    cases = [case_of(reading_of(log, actuator), candidates, healthy, spread) for log in logs]
+    cases = [case_of(item, candidates, healthy, spread) for item in items]
     if spread is not None and not any(n in spread.features for c in cases for n in c.unit.names):
         raise InputError(
             f"--spread: it was learnt of {spread.actuator}; none of its features is in these logs"
@@ -114,6 +115,27 @@ def diagnose(
     return replace(
         result, unobservable=blind, findings=findings, seconds=clock.perf_counter() - begin
     )
+
+
+def _broken(
+    logs: Sequence[Log],
+    items: Sequence[Reading],
+    baselines: Sequence[Log],
+    healthy: Sequence[Reading],
+    rate: float,
+) -> Diagnosis | None:
+    """What most logs say of the stand's sensors, each against baselines of its own test.
+
+    A sensor that fails does so in all of them; what one test alone shows is the actuator's.
+    """
+    answers = []
+    for log, item in zip(logs, items, strict=True):
+        same = [b for b, read in zip(baselines, healthy, strict=True) if item.same(read)]
+        answers.append(diagnose_sensors([log], same, rate))
+    named = [a for a in answers if a is not None]
+    if 2 * len(named) <= len(logs):
+        return None
+    return replace(named[0], logs=tuple(log.name for log in logs))
 
 
 def _heard(
