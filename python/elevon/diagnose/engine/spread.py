@@ -164,8 +164,8 @@ class LearnedSpread:
         try:
             rows = data.pop("features", {})
             features = {name: _row(document, name, row) for name, row in rows.items()}
-            scores = {name: tuple(map(float, data.pop(name))) for name in ("alone", "based")}
-            return cls(features=features, **scores, **data)
+            alone, based = (tuple(map(float, data.pop(name))) for name in ("alone", "based"))
+            return cls(features=features, alone=alone, based=based, **data)
         except (TypeError, AttributeError, KeyError, ValueError) as error:
             raise FormatError(f"{path}: a key is missing or of another kind: {error}") from None
 

@@ -166,18 +166,24 @@ def _assembled(about: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]])
     if not all(np.isfinite(a).all() for a in real.values()):
         raise ValueError("an array is not finite")
     stored = {n: real[f"discriminant.{n}"] for n in _FIELDS}
-    scalars = {n: float(stored.pop(n)) for n in ("shrinkage", "temperature")}
     classes = tuple(str(name) for name in about["classes"])
     count, wide = len(classes), len(about["features"])
     if stored["means"].shape != (count, wide) or stored["precision"].shape != (wide, wide):
         raise ValueError("classes and features are not those of the arrays")
     trees = {n.removeprefix("trees."): a for n, a in arrays.items() if n.startswith("trees.")}
     return LearnedClasses(
-        tuple(map(str, about["features"])), Discriminant(classes, **stored, **scalars),
+        tuple(map(str, about["features"])), _discriminant(classes, stored),
         Trees.build(trees) if trees else None, float(about["temperature"]),
         real["healthy"], real["distances"], real["command"], float(about["pace"]),
         float(about["seconds"]),
         None if about["pole_pairs"] is None else float(about["pole_pairs"]), about["report"],
+    )  # fmt: skip
+
+
+def _discriminant(classes: tuple[str, ...], stored: Mapping[str, Floats]) -> Discriminant:
+    return Discriminant(
+        classes, stored["means"], stored["scale"], stored["precision"], stored["low"],
+        stored["high"], float(stored["shrinkage"]), float(stored["temperature"]),
     )  # fmt: skip
 
 

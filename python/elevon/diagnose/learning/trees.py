@@ -85,7 +85,10 @@ class Trees:
             raise ValueError("a tree leads back to where it came from")
         if not all(np.isfinite(a).all() for a in real.values()):
             raise ValueError("an array is not finite")
-        return cls(**whole, **real)
+        return cls(
+            whole["feature"], real["threshold"], whole["left"], whole["right"], real["value"],
+            whole["roots"],
+        )  # fmt: skip
 
     @classmethod
     def of(cls, model: GradientBoostingClassifier) -> Trees:
