@@ -16,8 +16,9 @@ RUNS = ROOT / "docs" / "evidence" / "runs"
 #: Published cases that need no foreign data and take at most some minutes.
 CASES = (
     "torino-backlash", "torino-compliance", "torino-validation", "torino-loaded", "torino-drops",
-    "torino-fmeca", "low-fidelity", "nasa-current", "nasa-thermal",
-    "pisa-functional", "pisa-friction", "pisa-hydraulic",
+    "torino-fmeca", "low-fidelity", "nasa-current", "nasa-thermal", "pisa-functional",
+    "pisa-friction", "pisa-hydraulic", "nasa-faults", "nasa-flight", "pisa-validation",
+    "pisa-commutation",
 )  # fmt: skip
 
 

@@ -232,6 +232,13 @@ def commutation(row=None, pulses=None, **pulse):
     return checks_of([sector], [short] if pulses is None else pulses, 60.0)
 
 
+def monitoring(**changes):
+    """Return the checks of the simplified model, but for what is wrong."""
+    from elevon.reproduce.pisa_monitoring import MonitoringRow, checks_of
+
+    return checks_of([replace(MonitoringRow("low", 100.0, 0.02, 30.0, 0.02, 0.5, 1.0), **changes)])
+
+
 def functional(**changes):
     """Return the checks of every condition, but for what is wrong in each."""
     from elevon.reproduce.pisa_gear import CONDITIONS, FIGURES, TEMPERATURES
@@ -281,6 +288,7 @@ GOOD = BENCH_GOOD | {
     "pisa-hydraulic": gear.hydraulic_checks,
     "pisa-validation": gear.validation_checks,
     "pisa-commutation": commutation,
+    "pisa-monitoring": monitoring,
     "pisa-failures": failures,
     "cranfield": cranfield,
 }
@@ -428,6 +436,10 @@ PLANTED = BENCH_PLANTED | {
     ("pisa-commutation", "weakest braking of a shorted stretch"): partial(commutation, torque=0.01),
     ("pisa-commutation", "largest current of the shorted motor over the cut-off"):
         partial(commutation, peak=62.0),
+    ("pisa-monitoring", "simplified model, position"): partial(monitoring, position_percent=0.2),
+    ("pisa-monitoring", "simplified model, speed"): partial(monitoring, speed_percent=2.0),
+    ("pisa-monitoring", "simplified model, current"): partial(monitoring, current_percent=3.0),
+    ("pisa-monitoring", "simplified model, times faster"): partial(monitoring, faster=6.0),
     ("pisa-failures", "unsafe rows outside the listed set"): partial(failures, safe=False),
     ("pisa-failures", "listed rows that are safe"): partial(failures, listed=True),
     ("pisa-failures", "rows, one a fault, place, severity and phase"): partial(failures, missing=1),

@@ -342,6 +342,16 @@ CASES = (
         page=_R + "pisa_currents_page:commutation_report",
     ),
     PublishedCase(
+        "pisa-monitoring",
+        "Monitor the gear by the simplified model: its cost and errors beside the switching one.",
+        "four models, one retraction",
+        _R + "pisa_monitoring:reproduce_monitoring",
+        ("model", "step_us", "processor_s", "faster", "position_percent", "speed_percent",
+         "current_percent"),
+        "one retraction of ten seconds",
+        page=_R + "pisa_monitoring_page:monitoring_report",
+    ),
+    PublishedCase(
         "pisa-failures",
         "Every fault in every phase: what the control unit indicates, what is true, is it safe.",
         "every fault in every phase",
