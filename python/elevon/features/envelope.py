@@ -36,24 +36,18 @@ class EnvelopeOrders:
         Squared amplitude at the harmonics of each name's order.
     level : ndarray, shape (stretches,)
         Mean squared amplitude beside all lines: noise.
+    levels : float
+        Independent lines of noise that the level is known from.
     """
 
     turns: tuple[float, ...]
     power: Mapping[str, Floats]
     level: Floats
+    levels: float
 
     def score(self, name: str) -> float:
-        """Return the sum over stretches and harmonics of power over level.
-
-        Of noise alone it is a Gamma variable of shape `count`.
-        """
+        """Return the sum over stretches and harmonics of power over level."""
         return float(np.sum(self.power[name] / self.level[:, None]))
-
-    def chance(self, name: str) -> float:
-        """Return how often noise alone gives a score as high."""
-        from scipy.special import gammaincc
-
-        return float(gammaincc(self.count, self.score(name)))
 
     @property
     def count(self) -> int:
@@ -149,17 +143,19 @@ def envelope_orders(
     if not parts:
         raise ValueError("no stretch of two turns in one direction at a steady speed")
     rows: dict[str, list[Floats]] = {name: [] for name in orders}
-    levels, turns = [], []
+    levels, turns, known = [], [], 0.0
     for part in parts:
         even, length = _over_angle(angle[part], level_of[part])
         count = np.arange(1.0, harmonics + 1.0)
         lines = {name: np.asarray(order * count) for name, order in orders.items()}
         for name, at in lines.items():
             rows[name].append(_power(even, at))
-        levels.append(_level(even, length, list(orders.values())))
+        level, lines_of_noise = _level(even, length, list(orders.values()))
+        levels.append(level)
+        known += lines_of_noise
         turns.append(length)
     power = {name: np.array(items) for name, items in rows.items()}
-    return EnvelopeOrders(tuple(turns), power, np.array(levels))
+    return EnvelopeOrders(tuple(turns), power, np.array(levels), known)
 
 
 def stretches(angle: Floats, rate: float, edge: float = 0.0) -> list[slice]:
@@ -193,12 +189,16 @@ def _power(values: Floats, orders: Floats) -> Floats:
     return np.asarray(np.abs(2.0 * lines / np.sum(window)) ** 2)
 
 
-def _level(values: Floats, turns: float, orders: Sequence[float]) -> float:
-    """Return the mean power beside the lines: from the median, which single lines do not move."""
+def _level(values: Floats, turns: float, orders: Sequence[float]) -> tuple[float, float]:
+    """Return the mean power beside the lines, and from how many lines it is known.
+
+    From the median, which single lines do not move; it knows half as much as the mean would.
+    """
     low, high = _ORDERS
     grid: Floats = np.arange(low, high, 2.0 / turns)
     away = np.ones(len(grid), dtype=bool)
     for order in orders:
         away &= np.abs(grid / order - np.rint(grid / order)) * order > min(2.0 / turns, 0.3 * order)
     chosen: Floats = grid[away] if away.sum() > 8 else grid
-    return float(np.median(_power(values, chosen)) / np.log(2.0))
+    level = float(np.median(_power(values, chosen)) / np.log(2.0))
+    return level, len(chosen) * float(np.log(2.0)) ** 2

@@ -60,16 +60,20 @@ class PassEvidence:
 def evidence_of(measured: Sequence[EnvelopeOrders]) -> PassEvidence:
     """Return the evidence of logs.
 
-    The score of a place is a Gamma variable under noise. A spall's line adds to it what its
+    Under noise the score of a place over its lines is an F variable: the level is known from some
+    lines only. A spall's line adds to it what its
     amplitudes are worth; of unknown amplitude it is the likelihood at the best one, with half a
     unit off for each line (as Akaike's).
     """
-    from scipy.special import gammaincc
+    from scipy.stats import f
 
     places = list(measured[0].power)
     count = sum(item.count for item in measured)
     scores = {place: sum(item.score(place) for item in measured) for place in places}
-    chances = {place: float(gammaincc(count, score)) for place, score in scores.items()}
+    freedom = 2.0 * sum(item.levels for item in measured)
+    chances = {
+        place: float(f.sf(score / count, 2.0 * count, freedom)) for place, score in scores.items()
+    }
     gain = np.array([score - count * (1.0 + np.log(score / count)) for score in scores.values()])
     gain = np.where(np.array(list(scores.values())) > count, gain - 1.0, -np.inf)
     logs = np.concatenate(([np.log(1.0 - _PRIOR)], np.log(_PRIOR / len(places)) + gain))
