@@ -24,7 +24,7 @@ SECONDS = 10.0
 STEPS = (2e-5, 5e-5, 1e-4)
 """s; the default, and up to where the supply's capacitor allows (the core refuses longer ones)."""
 RECORD = "output_position,motor_speed,current_mean@400 Hz"
-ASKED = 40.0
+TARGET = 40.0
 """Times faster than the switching model that was asked for."""
 LEAST = 10.0
 """Times faster at least at the longest step; a busy processor halves what it measures at most."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from elevon.report import Report, ReportTable
-from elevon.reproduce.pisa_monitoring import ASKED, MonitoringResult
+from elevon.reproduce.pisa_monitoring import TARGET, MonitoringResult
 from elevon.reproduce.provenance import provenance
 
 
@@ -12,7 +12,7 @@ def monitoring_report(result: MonitoringResult, *, date: str | None = None) -> R
     report = Report(
         "Condition monitoring of the landing gear by the simplified model",
         "One retraction of ten seconds in the switching model and in the reduced-order one, both "
-        f"recorded at 400 Hz. {ASKED:g} times faster was asked for; the table has what this "
+        f"recorded at 400 Hz. {TARGET:g} times faster was asked for; the table has what this "
         "machine measured. Recorded at each of its steps, the reduced-order model costs four "
         "times as much: the recording, not the model.",
         date=date,
