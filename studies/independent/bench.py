@@ -113,7 +113,9 @@ def written(unit: Unit, test: str, folder: Path, seed: int, cause: Cause | None 
         counts *= cause.counts
     done = run(bench, sensors, TESTS[test], seed=seed, log=1.0 / unit.rate, counts=counts)
     folder.mkdir(parents=True, exist_ok=True)
-    return write_trial(folder / f"{test}.csv", done, sensors, Style(), seed)
+    path = folder / f"{test}.csv"
+    write_trial(path, done, sensors, Style(), seed)
+    return path
 
 
 #: Causes that are no candidates, each at the severity a maintainer would look for.

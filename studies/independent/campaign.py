@@ -121,7 +121,7 @@ def study_independent(
     begin = clock.perf_counter()
     calls = {f"unit {u.number}": partial(_of_unit, u, plan) for u in units(plan.seed, plan.units)}
     for name, test in SWITCHING if plan.switching else ():
-        calls[name] = partial(_switching, name, test, plan)  # type: ignore[assignment]
+        calls[name] = partial(_switching, name, test, plan)
     rows: dict[str, list[Judged]] = dict(
         side_by_side(calls, processes=processes, progress=progress)
     )
@@ -228,7 +228,7 @@ class _Judge:
 def _far(item: Reading, usual: dict[str, tuple[float, float]]) -> float:
     """Largest deviation of a feature from the unit's healthy days, in theirs."""
     seen = zip(item.features.names, item.features.values.tolist(), strict=True)
-    return max(abs(v - usual[n][0]) / usual[n][1] for n, v in seen if n in usual)
+    return float(max(abs(v - usual[n][0]) / usual[n][1] for n, v in seen if n in usual))
 
 
 def _answer(item: Reading, actuator: Actuator, base: Sequence[Reading]) -> Diagnosis:
@@ -246,7 +246,7 @@ def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
     test = next(t for t in standard_tests(actuator) if t.name == title)
     most = max(plan.baselines)
     days = [Day((), 100_000 * plan.seed + n) for n in range(most + plan.switching)]
-    unit = Unit(0, None, None, RATES[0])  # type: ignore[arg-type]
+    unit = Unit(0, None, None, RATES[0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ElevonWarning)
         logs = day_logs(actuator, test, days, "high")
