@@ -1,6 +1,7 @@
 """The guide reads easily: length, words a sentence, no seed numbers; what its pages show runs."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -20,6 +21,20 @@ def test_a_page_of_the_guide(path):
     assert page.lines <= MOST_LINES
     assert page.pace < MOST_WORDS
     assert not page.seeds
+
+
+HOW_TO = [path for path in guide_pages() if path.parent.name == "how-to" and path.stem != "index"]
+
+
+@pytest.mark.parametrize("path", HOW_TO, ids=lambda path: path.stem)
+def test_a_page_of_a_task_has_the_form(path):
+    """Task, command, how to read its answer, and at least three limits."""
+    text = path.read_text("utf-8")
+    assert re.search(r"^Task: ", text, re.M)
+    assert re.search(r"^```(sh|console|python|toml)$", text, re.M)
+    assert text.count("\n## How to read it\n") == 1
+    limits = text.partition("\n## Limits\n")[2].partition("\n## ")[0]
+    assert len(re.findall(r"^[*-] ", limits, re.M)) >= 3
 
 
 def test_the_readme_is_short():
