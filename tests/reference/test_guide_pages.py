@@ -31,8 +31,8 @@ def test_a_page_of_a_task_has_the_form(path):
     """Task, command, how to read its answer, and at least three limits."""
     text = path.read_text("utf-8")
     assert re.search(r"^Task: ", text, re.M)
-    assert re.search(r"^```(sh|console|python|toml)$", text, re.M)
-    assert text.count("\n## How to read it\n") == 1
+    assert re.search(r"^```(sh|console|python|toml|matlab)$", text, re.M)
+    assert re.search(r"^##+ How to read it$", text, re.M)
     limits = text.partition("\n## Limits\n")[2].partition("\n## ")[0]
     assert len(re.findall(r"^[*-] ", limits, re.M)) >= 3
 

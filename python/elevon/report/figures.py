@@ -196,9 +196,14 @@ def _legends_aside(figure: Figure) -> None:
         if legend is None or legend._bbox_to_anchor is not None:  # type: ignore[attr-defined]
             continue
         titled = bool(axes.get_title("left") or axes.get_title())
-        legend.set_loc("upper left" if titled else "lower right")
-        legend.set_bbox_to_anchor((1.0, 1.0), transform=axes.transAxes)
-        legend.set_ncols(1 if titled else min(4, len(legend.get_texts())))
+        handles, labels = axes.get_legend_handles_labels()
+        if labels != [text.get_text() for text in legend.get_texts()]:
+            handles = legend.legend_handles
+            labels = [text.get_text() for text in legend.get_texts()]
+        axes.legend(
+            handles, labels, loc="upper left" if titled else "lower right",
+            bbox_to_anchor=(1.0, 1.0), ncols=1 if titled else min(3, len(labels)),
+        )  # fmt: skip
 
 
 def _svg_text(figure: Figure, name: str, **options: Any) -> str:
