@@ -157,6 +157,8 @@ def _heard(
     try:
         return diagnose_spall(logs, actuator, rate if alone else 0.5 * rate, alone=alone)
     except ValueError as error:
+        if alone:
+            raise InputError(f"accelerometer: {error}") from None
         return None, (f"accelerometer: {error}",)
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from elevon.features.envelope import EnvelopeOrders
     from elevon.logs.log import Log
 
-_SIZES = (1e-4, 2e-4, 3e-4, 4.5e-4, 7e-4, 1e-3, 1.5e-3, 2.2e-3, 3.3e-3, 5e-3)
+_SIZES = tuple(np.geomspace(1e-4, 5e-3, 24).tolist())
 """m; up to where the catalogue ends."""
 _GRID = 400
 _MODEL = 0.1
