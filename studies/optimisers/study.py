@@ -273,9 +273,13 @@ def _ours(unit: Actuator, log: Log, base: Log) -> dict[str, Callable[[], Diagnos
     from elevon.diagnose.by_model import diagnose
     from elevon.diagnose.surrogate import diagnose_by_both, diagnose_by_surrogate
 
-    ways = dict(zip(OURS, (diagnose, diagnose_by_both, diagnose_by_surrogate), strict=True))
     options: dict[str, Any] = {"baselines": [base], "faults": list(CAUSES)}
-    return {name: partial(way, [log], unit, **options) for name, way in ways.items()}
+    calls = (
+        partial(diagnose, [log], unit, **options),
+        partial(diagnose_by_both, [log], unit, **options),
+        partial(diagnose_by_surrogate, [log], unit, **options),
+    )
+    return dict(zip(OURS, calls, strict=True))
 
 
 def _model_runs(unit: Actuator, log: Log) -> int:

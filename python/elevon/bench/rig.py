@@ -18,6 +18,7 @@ from elevon.bench.procedure import (
     ForceStep,
     Procedure,
     RigStep,
+    SensorStep,
     SettingsStep,
     SpringStep,
     TraceStep,
@@ -151,7 +152,7 @@ def setups(
         if isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(setups))
             setups.append(_setup(step, rig, actuator, conditions, faults))
-        elif isinstance(step, ForceStep | RigStep):
+        elif isinstance(step, ForceStep | RigStep | SensorStep):
             raise InputError(f"{procedure.name}: the rotary bench has no {step.kind!r}")
         else:
             rig = _changed(rig, step)

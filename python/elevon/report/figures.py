@@ -198,7 +198,7 @@ def _legends_aside(figure: Figure) -> None:
         titled = bool(axes.get_title("left") or axes.get_title())
         handles, labels = axes.get_legend_handles_labels()
         if labels != [text.get_text() for text in legend.get_texts()]:
-            handles = legend.legend_handles
+            handles = [handle for handle in legend.legend_handles if handle is not None]
             labels = [text.get_text() for text in legend.get_texts()]
         axes.legend(
             handles, labels, loc="upper left" if titled else "lower right",

@@ -255,8 +255,8 @@ def _mismatch(
     weight = np.exp(log - log.max())
     weight /= weight.sum()
     mean = float(np.sum(weight / _GRID))
-    variance = float(np.sum(weight * (1.0 / _GRID - mean) ** 2))
-    return VarianceFactor(1.0 / mean, 2.0 * mean**2 / variance)
+    scatter = float(np.sum(weight * (1.0 / _GRID - mean) ** 2))
+    return VarianceFactor(1.0 / mean, 2.0 * mean**2 / scatter)
 
 
 def _centre(c: TestResiduals, unit: str, daily: float) -> tuple[float, float, float]:
