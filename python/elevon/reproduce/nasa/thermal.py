@@ -36,10 +36,11 @@ RECORD = (
     "energy_heat_stored,energy_air@"
 )
 LIMIT_K = 0.01
-#: A shaft that nothing moves, and a drive that holds the current exactly.
+#: A shaft that nothing moves, and a drive that holds the current exactly: behind the sensor's
+#: filter relays overshoot even a band of nothing, and that ripple heats beside the mean current.
 LOCKED = {
     "friction.static": 1e4, "friction.dynamic": 1e4, "inverter.hysteresis_band": 1e-9,
-    "low.step": 1e-3,
+    "sensor.current.bandwidth": 0.0, "low.step": 1e-3,
 }  # fmt: skip
 
 
