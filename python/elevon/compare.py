@@ -26,7 +26,7 @@ SIGNALS = ("output_position", "motor_speed", "current_q")
 """The channels of these roles in a servo, true values before what the sensors show."""
 RATES = {"high": "10 kHz", "low": "10 kHz"}
 """The relays' ripple (1 to 5 kHz) must not alias. Both alike, or the recording would be compared: a
-landing gear recorded at each step of 20 us takes four times as long. Longer steps: every one."""
+landing gear recorded at each step of 20 us takes four times as long. See `compared_rate`."""
 GRID_HZ = 400.0
 """Rate at which the filtered signals are compared: that of the bench's log."""
 START_S = 10.0
@@ -272,13 +272,17 @@ def compared_signals(wiring: str) -> dict[str, str]:
 
 
 def compared_rate(actuator: Actuator, fidelity: str) -> str:
-    """Return the rate at which a model is recorded: `RATES`, or each of its longer steps."""
+    """Return the rate at which a model is recorded: every so many of its steps.
+
+    `RATES`, or the next higher rate that is a whole number of steps; longer steps: every one.
+    """
     from elevon.simulate import solver_step
     from elevon.units import parse_quantity
 
-    rate = RATES[fidelity]
-    steps = 1.0 / (solver_step(actuator, fidelity) * parse_quantity(rate, "Hz", "rate"))
-    return rate if steps > 0.999 else "every"
+    step = solver_step(actuator, fidelity)
+    steps = 1.0 / (step * parse_quantity(RATES[fidelity], "Hz", "rate"))
+    period = math.floor(steps * (1.0 + 1e-9))  # rounding of a step that divides the period
+    return f"{1.0 / (period * step)!r} Hz" if period > 1 else "every"
 
 
 def run_pair(

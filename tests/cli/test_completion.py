@@ -114,6 +114,6 @@ def test_groups_name_their_commands(capsys):
     assert "torino-backlash" in errors
     assert "nasa-baseline" in errors
     assert main(["reproduce", "nasa-basline"]) == 2
-    assert "Did you mean nasa-baseline?" in capsys.readouterr().err
+    assert "Did you mean nasa-baseline" in capsys.readouterr().err
     assert main(["bench", "rnu"]) == 2
     assert "Did you mean run?" in capsys.readouterr().err

@@ -7,8 +7,11 @@ import pytest
 
 import elevon
 from elevon.cli import main
-from elevon.compare import compare, filtered
+from elevon.compare import RATES, compare, compared_rate, filtered
 from elevon.errors import InputError
+from elevon.record_plan import period_of
+from elevon.simulate import solver_step
+from elevon.units import parse_quantity
 
 SHORT = {
     "duration": "3 s",
@@ -47,6 +50,18 @@ def test_the_filter_passes_the_slow_stops_the_fast_and_delays_nothing():
         smooth = filtered(recording, "x", middle, 10.0)
         expected = gain * np.sin(2 * np.pi * hertz * middle)
         assert np.abs(smooth - expected).max() < 0.01
+
+
+@pytest.mark.parametrize("seconds", [None, 1e-6, 3e-6, 7e-6, 1.1e-5])
+def test_both_are_recorded_at_whole_steps_no_slower_than_asked(seconds):
+    for name in ("torino-rotary", "nasa-ballscrew", "pisa-landing-gear"):
+        actuator = elevon.Actuator.load(name)
+        actuator = actuator.with_values({"solver.step": seconds} if seconds else {})
+        for fidelity, rate in RATES.items():
+            step, wanted = solver_step(actuator, fidelity), parse_quantity(rate, "Hz", "rate")
+            steps = period_of(compared_rate(actuator, fidelity), step)
+            assert steps == 1 or 1.0 / (steps * step) >= 0.999999 * wanted
+            assert 1.0 / ((steps + 1) * step) < wanted
 
 
 def test_refusals():

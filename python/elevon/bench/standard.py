@@ -46,18 +46,21 @@ def standard_tests(actuator: Actuator) -> tuple[StandardTest, ...]:
     """Return the tests, in the order of the bench's list.
 
     What commands nothing, or is there for temperatures or vibration (a rate of its own), is none.
+    Of a rotary bench's procedures that ask for the same motion, the first is one.
     """
     stand = stand_of(actuator.wiring)
-    out = []
+    out: list[StandardTest] = []
+    motions = []
     for name in procedure_names(stand.name):
         procedure = load_procedure(name)
         traces = [step for step in procedure.step if isinstance(step, TraceStep)]
         moved = any(isinstance(step, RigStep) and step.terms for step in procedure.step)
         if stand.equipment == POSITION:
-            traces = traces[:1]
+            traces = [trace for trace in traces[:1] if trace.command not in motions]
         for trace in traces:
             if not moved and _read(trace):
                 out.append(StandardTest(trace.name, _up_to(procedure, trace)))
+                motions.append(trace.command)
     return tuple(out)
 
 

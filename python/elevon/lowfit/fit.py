@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, filtered
+from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, compared_rate, filtered
 from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
 from elevon.lowfit.cases import FitCase
@@ -237,7 +237,7 @@ def _signals(
     from elevon.simulate import Run, simulate_batch
 
     runs = [Run(actuator, case.scenario, seed, case.name) for case in cases]
-    record = f"{','.join(SIGNALS)}@{RATES[fidelity]}"
+    record = f"{','.join(SIGNALS)}@{compared_rate(actuator, fidelity)}"
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
     return [_filtered(run, case) for run, case in zip(recordings, cases, strict=True)]
 
