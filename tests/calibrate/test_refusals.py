@@ -48,6 +48,7 @@ def one_way(folder):
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_log_at_rest_determines_nothing(tmp_path, before):
     with pytest.raises(InputError, match=r"determine|motion|excites"):
         calibrate(read_logs([standing(tmp_path)]), before)

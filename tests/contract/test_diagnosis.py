@@ -64,7 +64,10 @@ def halved(test: StandardTest) -> StandardTest:
     return StandardTest(test.name, test.procedure.model_copy(update={"step": steps}))
 
 
-@pytest.mark.parametrize("name", TESTED)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=pytest.mark.long if shipped.takes_actions(n) else ()) for n in TESTED],
+)
 def test_some_faults_are_found_or_reported_as_unseen(name: str) -> None:
     """The largest severity of a few faults of the catalogue, in half of one test."""
     test = halved(standard_tests(shipped.actuator(name))[0])

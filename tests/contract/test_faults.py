@@ -15,7 +15,19 @@ from tests.contract import shipped
 from tests.contract.cells import Cell, fault
 from tests.contract.matrix import FEW, PARTS, cells, lasting, of_one_drive, silent, wrong
 
-PLAIN = pytest.mark.parametrize("cell", cells(every=False), ids=lambda cell: cell.title)
+
+def _costly(cell: Cell) -> bool:
+    return cell.fidelity == "high" and shipped.takes_actions(cell.name)
+
+
+#: A control unit's switching model takes as long as all others together.
+PLAIN = pytest.mark.parametrize(
+    "cell",
+    [
+        pytest.param(cell, id=cell.title, marks=pytest.mark.long if _costly(cell) else ())
+        for cell in cells(every=False)
+    ],
+)
 
 
 @PLAIN

@@ -12,6 +12,8 @@ import pytest
 NOT_ENGAGED, STALLED, HALL, PROXIMITY, UNCOMMANDED = 3, 4, 7, 8, 10
 SUPPLY, WHEELS, NO_CURRENT, POWER = 11, 12, 13, 14
 BOTH = pytest.mark.parametrize("fidelity", ["low", "high"])
+#: The switching model takes most of the time; the numbered scenarios run both in any case.
+EACH = pytest.mark.parametrize("fidelity", ["low", pytest.param("high", marks=pytest.mark.long)])
 SWITCHES = ("0", "25", "75", "100")
 JAM = {"kind": "jam", "place": "screw", "severity": 40e3, "position": "130 mm", "width": "20 mm"}
 

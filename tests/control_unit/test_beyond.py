@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.control_unit.situations import (
-    BOTH,
+    EACH,
     EXTENDING,
     FAULT,
     JAM,
@@ -34,7 +34,7 @@ from tests.physics.gear import EXTENDED, gear, gear_run, gears, states
 # ------------------------------------------------------------------ 1. power-up
 
 
-@BOTH
+@EACH
 def test_a_healthy_end_is_known_within_two_seconds(fidelity: str) -> None:
     """Unconfirmed at power-up; pressing against the stop of the shown end confirms it."""
     ends = [(None, RETRACTED), (EXTENDED, LOCKED)]
@@ -48,7 +48,7 @@ def test_a_healthy_end_is_known_within_two_seconds(fidelity: str) -> None:
         assert abs(rec["nut_position"].values - rec["nut_position"].values[0]).max() < 1.5e-3, row
 
 
-@BOTH
+@EACH
 def test_a_lock_switch_stuck_at_power_up_is_not_a_lock(fidelity: str) -> None:
     """The press moves the leg: the switch is false, the extension completes, no lock is shown."""
     starts = ["200 mm", "230 mm", "260 mm"]
@@ -62,7 +62,7 @@ def test_a_lock_switch_stuck_at_power_up_is_not_a_lock(fidelity: str) -> None:
         assert "the switch on the lock sleeve fails" in rec.meta["message"], start
 
 
-@BOTH
+@EACH
 @pytest.mark.parametrize("time", [0.3, 3.0])
 def test_free_fall_is_not_refused_on_the_word_of_the_lock_switch(
     time: float, fidelity: str
@@ -76,7 +76,7 @@ def test_free_fall_is_not_refused_on_the_word_of_the_lock_switch(
     assert not false_end(rec)
 
 
-@BOTH
+@EACH
 def test_a_home_switch_stuck_at_power_up_is_not_retracted(fidelity: str) -> None:
     """The press moves the leg by a few millimetres; retracted is never shown."""
     rows = [(start, factor) for start in (5.0, 30.0, 60.0) for factor in (1.0, 3.5)]
@@ -111,7 +111,7 @@ def test_no_press_upwards_with_weight_on_wheels(start: str | None) -> None:
 # ------------------------------------------------------------------ 2. the Hall sensors' supply
 
 
-@BOTH
+@EACH
 def test_an_intermittent_hall_supply_ends_locked(fidelity: str) -> None:
     """10 and 12 ms each 0.4 s: neither overspeed nor an unlocked gear; a warning names it."""
     runs = [gear_run((0.1, "extend"), duration=9.0, faults=[hall_supply(0.4, duty, 1.5)])
@@ -123,7 +123,7 @@ def test_an_intermittent_hall_supply_ends_locked(fidelity: str) -> None:
         assert longest(np.abs(rec["current_line"].values) > 30.0) < 1.0
 
 
-@BOTH
+@EACH
 def test_a_jam_is_noticed_behind_an_intermittent_hall_supply(fidelity: str) -> None:
     """An invalid code does not renew the edge timer: each try ends within a second."""
     rec = gear((0.1, "extend"), duration=8.0, faults=[hall_supply(0.4, 0.03), JAM],
@@ -143,7 +143,7 @@ def test_no_sensor_unlocks_a_locked_gear() -> None:
         assert rec["locked"].values.min() == 1.0, fault
 
 
-@BOTH
+@EACH
 def test_a_flickering_switch_in_mid_stroke_unlocks_nothing(fidelity: str) -> None:
     """From 200 mm its false edges alone would place the nut, short of the lock it stands in."""
     often = (0.1, "extend"), (1.0, "extend"), (4.0, "stop"), (5.0, "extend")
@@ -161,7 +161,7 @@ def test_a_flickering_switch_in_mid_stroke_unlocks_nothing(fidelity: str) -> Non
 # ------------------------------------------------------------------ 3. pulses and weight on wheels
 
 
-@BOTH
+@EACH
 def test_a_pulse_of_a_switch_changes_nothing(fidelity: str) -> None:
     """5 ms in mid-retraction: the same states at the same times."""
     pulses = [during("proximity_on", f"sensor.proximity_{name}", 3.0, 3.005) for name in SWITCHES]
@@ -183,7 +183,7 @@ def test_chatter_is_a_fault_of_the_switch() -> None:
     assert rec.final["locked"] == 1.0
 
 
-@BOTH
+@EACH
 def test_a_dropout_of_the_wheels_switch_does_not_retract_on_the_ground(fidelity: str) -> None:
     """Without weight just when the command comes: refused, nothing moves."""
     lengths = (0.002, 0.02, 0.3)
@@ -195,7 +195,7 @@ def test_a_dropout_of_the_wheels_switch_does_not_retract_on_the_ground(fidelity:
         assert rec["locked"].values.min() == 1.0, length
 
 
-@BOTH
+@EACH
 def test_weight_on_wheels_ends_a_retraction(fidelity: str) -> None:
     """Watched through the motion: the leg stops within 20 ms and says why."""
     rec = gear((0.1, "retract"), duration=3.0, start=EXTENDED, fidelity=fidelity,
@@ -216,7 +216,7 @@ def test_a_retraction_is_accepted_a_second_after_lift_off() -> None:
 # ------------------------------------------------------------------ 4. supply
 
 
-@BOTH
+@EACH
 @pytest.mark.parametrize(("action", "start"), [("extend", None), ("retract", EXTENDED)])
 def test_a_lost_supply_sets_the_brake(action: str, start: str | None, fidelity: str) -> None:
     """1 % of 28 V is left: the brake falls in below its drop-out voltage, nothing creeps."""
@@ -231,7 +231,7 @@ def test_a_lost_supply_sets_the_brake(action: str, start: str | None, fidelity: 
     assert "lost its power" in rec.meta["message"]
 
 
-@BOTH
+@EACH
 def test_a_power_cycle_in_mid_travel(fidelity: str) -> None:
     """Off, started, stopped where it is; the next command completes, the standing one does not."""
     cut = during("sag", "supply", 2.0, 3.0, severity=0.99)
@@ -266,7 +266,7 @@ def test_a_supply_below_its_limit_ends_the_motion(severity: float) -> None:
 # ------------------------------------------------------------------ 6. messages
 
 
-@BOTH
+@EACH
 def test_an_open_phase_is_no_current(fidelity: str) -> None:
     """The locked gear stands without a current: neither the lock nor a jam is the cause."""
     runs = [gear_run((0.1, "retract"), duration=7.0, start=EXTENDED,

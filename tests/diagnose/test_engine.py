@@ -110,7 +110,8 @@ def test_without_the_voltage_a_short_and_a_current_sensor_are_one_cause(unit):
     assert ("bearing", "bearing.cage") in reasons
 
 
-@pytest.mark.parametrize("fidelity", ["low", pytest.param("high", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("fidelity", ["low", "high"])
 def test_an_eccentric_rotor_is_one_of_a_periodic_flux(unit, fidelity):
     """Unless the actuator states its law: named by its own and by none other."""
     pwm = unit.with_values({"drive.kind": "pwm"})
@@ -149,7 +150,7 @@ def test_what_a_fault_leaves_alone_or_to_chance_is_no_evidence_of_it(unit, logs)
     assert not model.uncertainty(sensor.key, 0.2).any()
 
 
-@pytest.mark.parametrize("baselines", [(), ("base",)])
+@pytest.mark.parametrize("baselines", [pytest.param((), marks=pytest.mark.long), ("base",)])
 def test_an_answer_does_not_depend_on_what_was_asked_before(unit, logs, baselines):
     def chance_of(name):
         whole = answer(unit, logs[name], *(logs[b] for b in baselines), faults=FEW).to_dict()

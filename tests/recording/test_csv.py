@@ -135,7 +135,10 @@ def _killed_at(save, at):
     return process.exitcode
 
 
-@pytest.mark.parametrize("first", [True, False], ids=["new", "replaced"])
+@pytest.mark.parametrize(
+    "first",
+    [pytest.param(True, marks=pytest.mark.long, id="new"), pytest.param(False, id="replaced")],
+)
 def test_tables_of_several_clocks_cut_short_are_the_old_or_the_new(tmp_path, first):
     path, new = tmp_path / "a.csv", ordinary().with_meta(seed=9)
     states, at, code = [], 0, 9

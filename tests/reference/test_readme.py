@@ -26,6 +26,9 @@ LONG = (
     "--faults-table",
     "--loop ",
     "reproduce nasa-",
+    "reproduce torino-validation",
+    "reproduce torino-fmeca",
+    "response nasa-ballscrew",
     "reproduce pisa-",
     "studies prognosis",
     "studies foreign",
@@ -187,12 +190,10 @@ def test_examples_of_a_page(page, tmp_path):
     assert done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "page",
-    [
-        "docs/how-to/own-actuators.md",
-        pytest.param("docs/start/tutorial.md", marks=pytest.mark.long),
-    ],
+    ["docs/how-to/own-actuators.md", "docs/start/tutorial.md"],
 )
 def test_commands_of_a_page_in_their_order(page, tmp_path):
     """The commands of a page build on each other: all of them run in one folder, as written."""

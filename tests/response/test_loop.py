@@ -91,6 +91,7 @@ def test_measured_loops_are_the_closed_forms(loop, options):
         assert abs(found.value - expected) < 2.0 * half + 0.01 * expected, name
 
 
+@pytest.mark.long
 def test_the_reduced_order_loop_is_that_of_its_linear_model():
     """L = T / (1 - T), with T from the impulse responses of a session."""
     model = linearise(ACTUATOR, period="0.5 ms", horizon="0.4 s")
