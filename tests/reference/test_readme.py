@@ -22,6 +22,8 @@ PAGES = [
 LONG = (
     "reproduce torino-backlash",
     "reproduce torino-compliance",
+    "reproduce torino-fmeca",
+    "reproduce torino-validation",
     "compare ",
     "--faults-table",
     "--loop ",
