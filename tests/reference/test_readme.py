@@ -28,8 +28,6 @@ LONG = (
     "--faults-table",
     "--loop ",
     "reproduce nasa-",
-    "reproduce torino-validation",
-    "reproduce torino-fmeca",
     "response nasa-ballscrew",
     "reproduce pisa-",
     "studies prognosis",
