@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.bench.procedure import ForceStep
 from elevon.bench.stand import ForceSpec
+from elevon.bench.steps import ForceStep
 from elevon.errors import InputError
 from elevon.units import parse_quantity
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.bench.procedure import SpringStep, WeightsStep
+from elevon.bench.steps import SpringStep, WeightsStep
 from elevon.errors import InputError
 from elevon.units import parse_quantity
 

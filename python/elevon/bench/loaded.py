@@ -13,17 +13,11 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop, target_force
-from elevon.bench.procedure import (
-    ForceStep,
-    Procedure,
-    RigStep,
-    SensorStep,
-    SettingsStep,
-    TraceStep,
-)
+from elevon.bench.procedure import Procedure
 from elevon.bench.rating import SHARE, holds, rated_factor
 from elevon.bench.rig import Conditions, draw_conditions, moved
 from elevon.bench.stand import Stand
+from elevon.bench.steps import ForceStep, RigStep, SensorStep, SettingsStep, TraceStep
 from elevon.errors import DivergedError, InputError, unknown
 from elevon.faults import Fault
 from elevon.progress import Progress

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.bench.procedure import ForceStep
+from elevon.bench.steps import ForceStep
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:

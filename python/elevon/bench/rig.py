@@ -12,11 +12,11 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.bench.brake_rig import BrakeRig, BrakeRun, CellState, brake_loop
 from elevon.bench.load_module import Springs, Weights, springs_of, weights_of
-from elevon.bench.procedure import (
+from elevon.bench.procedure import Procedure
+from elevon.bench.steps import (
     BacklashStep,
     BrakeStep,
     ForceStep,
-    Procedure,
     RigStep,
     SensorStep,
     SettingsStep,

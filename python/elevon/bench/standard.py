@@ -8,15 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from elevon.bench.procedure import (
-    BacklashStep,
-    Procedure,
-    RigStep,
-    TraceStep,
-    load_procedure,
-    procedure_names,
-)
+from elevon.bench.procedure import Procedure, load_procedure, procedure_names
 from elevon.bench.stand import stand_of
+from elevon.bench.steps import BacklashStep, RigStep, TraceStep
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:

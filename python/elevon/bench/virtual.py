@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from elevon.bench.procedure import BacklashStep, Procedure, TraceStep
+from elevon.bench.procedure import Procedure
 from elevon.bench.rig import Setup
+from elevon.bench.steps import BacklashStep, TraceStep
 from elevon.bench.traces import cell_signals, drive_signals
 from elevon.logs.command.note import CommandNote
 from elevon.logs.log import Log

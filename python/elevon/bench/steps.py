@@ -1,0 +1,315 @@
+"""Steps of a bench's procedure: typed, each refused where the bench could not do it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from typing import Annotated, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    field_validator,
+    model_validator,
+)
+
+from elevon.errors import InputError
+from elevon.scenario.scenario import Command, Term
+from elevon.units import parse_quantity
+
+Quantity = StrictInt | StrictFloat | StrictStr
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}\Z")
+
+
+class Frozen(BaseModel):
+    """Data of a procedure: no key unknown, no value changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def _checked(value: Quantity, unit: str, low: float, name: str) -> Quantity:
+    """Return a quantity as given, after its unit and its lower limit have been checked."""
+    try:
+        number = parse_quantity(value, unit, name)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+    if number < low:
+        raise ValueError(f"{name} = {value} is below {low:g} {unit}")
+    return value
+
+
+def plain_name(value: str) -> str:
+    """Refuse what is no plain file name, or would be taken for a log's companion."""
+    if not _NAME.match(value) or value.endswith(("_loadcell", "_command")):
+        raise ValueError(f"{value!r} is not a plain file name (letters, digits, '-', '_')")
+    return value
+
+
+class BacklashStep(Frozen):
+    """Set the backlash: by the micrometer, net (the intrinsic one added), or in total.
+
+    Attributes
+    ----------
+    micrometer : quantity, optional
+        Reading, mm.
+    curve : str
+        ``geometric`` or ``measured``: how a reading becomes a backlash.
+    net, total : quantity, optional
+        Backlash at the output; `net` is what the spacing adds to the gear's own.
+    """
+
+    kind: Literal["backlash"]
+    micrometer: Quantity | None = None
+    curve: Literal["geometric", "measured"] = "measured"
+    net: Quantity | None = None
+    total: Quantity | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [n for n in ("micrometer", "net", "total") if getattr(self, n) is not None]
+        if len(given) != 1:
+            raise ValueError("a backlash needs exactly one of 'micrometer', 'net', 'total'")
+        try:
+            self.value()
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    def value(self) -> float:
+        """Return the total backlash at the output [rad]."""
+        from elevon.bench.micrometer import INTRINSIC_BACKLASH, total_backlash
+
+        if self.micrometer is not None:
+            reading = 1e3 * parse_quantity(self.micrometer, "m", "micrometer")
+            return total_backlash(reading, self.curve)
+        text, extra = (self.net, INTRINSIC_BACKLASH) if self.net is not None else (self.total, 0.0)
+        assert text is not None
+        backlash = parse_quantity(text, "rad", "backlash")
+        if backlash < 0.0:
+            raise InputError(f"backlash = {text} must not be negative")
+        return backlash + extra
+
+
+class BrakeStep(Frozen):
+    """Set the command of the brake's loop; no terms: the brake is off.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Sum of waveforms, N m on the motor shaft, counted from the trigger.
+    """
+
+    kind: Literal["brake"]
+    terms: tuple[Term, ...] = ()
+
+
+class SpringStep(Frozen):
+    """Fit the springs of the load module, or take them off.
+
+    Attributes
+    ----------
+    fitted : bool
+        Whether the cables are hooked on.
+    stiffness : quantity
+        Of each of the two springs, N/m.
+    radius : quantity
+        Of the winding guide, m.
+    extension : quantity
+        Of each spring while the output stands at zero, m.
+    mover : quantity
+        Displacement of the mover, m: adds a radial force on the guide.
+    """
+
+    kind: Literal["spring"]
+    fitted: bool = True
+    stiffness: Quantity = 61.4
+    radius: Quantity = 0.080
+    extension: Quantity = 0.10
+    mover: Quantity = 0.0
+
+    @field_validator("stiffness")
+    @classmethod
+    def _stiffness(cls, value: Quantity) -> Quantity:
+        return _checked(value, "N/m", 0.0, "stiffness")
+
+    @field_validator("radius", "extension", "mover")
+    @classmethod
+    def _length(cls, value: Quantity) -> Quantity:
+        return _checked(value, "m", 0.0, "length")
+
+
+class Drop(Frozen):
+    """One mass hung on each cable from a time to another, counted from the trigger."""
+
+    mass: Quantity
+    at: Quantity
+    until: Quantity
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        _checked(self.mass, "kg", 0.0, "mass")
+        _checked(self.at, "s", 0.0, "at")
+        start, stop = (parse_quantity(x, "s") for x in (self.at, self.until))
+        if stop <= start:
+            raise ValueError(f"until = {self.until} must be after at = {self.at}")
+        return self
+
+
+class WeightsStep(Frozen):
+    """Hang weights on the winding guide's cables; no drops: none.
+
+    Attributes
+    ----------
+    drops : tuple of Drop
+        In the order of time, not overlapping.
+    cables : int
+        One or two cables carry the mass each.
+    radius : quantity
+        Of the winding guide, m.
+    """
+
+    kind: Literal["weights"]
+    drops: tuple[Drop, ...] = ()
+    cables: Literal[1, 2] = 2
+    radius: Quantity = 0.080
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        ends = 0.0
+        for drop in self.drops:
+            if parse_quantity(drop.at, "s") < ends:
+                raise ValueError(f"the drop at {drop.at} begins before the one before it ends")
+            ends = parse_quantity(drop.until, "s")
+        return self
+
+
+class ForceStep(Frozen):
+    """Set the load actuator's command; parts add up, positive opposes positive motion.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        Sum of waveforms, N, counted from the command's start.
+    opposing : quantity
+        Against motion of either direction, N; negative: along it.
+    stiffness : quantity
+        Of a spring at rest at zero, N/m.
+    positions, forces : tuple of float
+        Force [N] against the output's position [m]; linear between, held outside.
+    """
+
+    kind: Literal["force"]
+    terms: tuple[Term, ...] = ()
+    opposing: Quantity = 0.0
+    stiffness: Quantity = 0.0
+    positions: tuple[StrictInt | StrictFloat, ...] = ()
+    forces: tuple[StrictInt | StrictFloat, ...] = ()
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        _checked(self.opposing, "N", -math.inf, "opposing")
+        _checked(self.stiffness, "N/m", 0.0, "stiffness")
+        if len(self.positions) != len(self.forces):
+            raise ValueError("'positions' and 'forces' must be of one length")
+        if any(b <= a for a, b in itertools.pairwise(self.positions)):
+            raise ValueError("'positions' must rise")
+        return self
+
+
+class RigStep(Frozen):
+    """Move the output by the rig, m/s (a friction test); no terms: the actuator moves itself."""
+
+    kind: Literal["rig"]
+    terms: tuple[Term, ...] = ()
+
+
+class SettingsStep(Frozen):
+    """Change parameters of the actuator for the logs that follow, such as the drive's gains."""
+
+    kind: Literal["settings"]
+    parameters: dict[str, Quantity]
+
+
+class SensorStep(Frozen):
+    """Let a sensor of the stand fail in the logs that follow: none of the actuator's own.
+
+    Attributes
+    ----------
+    channel : str
+        Role that the stand records, such as ``load_cell`` or ``surface_temperature``.
+    gain : float
+        Factor on what it measures.
+    offset : quantity
+        Added to it, in the channel's unit.
+    fault : str
+        ``stuck``: what it measured last; ``dead``: nothing but the recorder's noise.
+    at : quantity
+        When it becomes so, s from the log's beginning.
+    """
+
+    kind: Literal["sensor"]
+    channel: StrictStr
+    gain: StrictInt | StrictFloat = 1.0
+    offset: Quantity = 0.0
+    fault: Literal["none", "stuck", "dead"] = "none"
+    at: Quantity = 0.0
+
+    @field_validator("at")
+    @classmethod
+    def _later(cls, value: Quantity) -> Quantity:
+        return _checked(value, "s", 0.0, "at")
+
+
+class TraceStep(Frozen):
+    """Record one log.
+
+    Attributes
+    ----------
+    name : str
+        File name without ending.
+    duration : quantity
+        Length of the log, s.
+    command : Command
+        As in a scenario, counted from the command's start.
+    rate : quantity, optional
+        Samples a second; default the stand's. The rotary's drive has a rate of its own.
+    initial : dict
+        Where the output stands at first, as in a scenario.
+    """
+
+    kind: Literal["trace"]
+    name: StrictStr
+    duration: Quantity
+    command: Command = Command()
+    rate: Quantity | None = None
+    initial: dict[str, Quantity] = Field(default_factory=dict)
+
+    @field_validator("rate")
+    @classmethod
+    def _fast(cls, value: Quantity | None) -> Quantity | None:
+        return None if value is None else _checked(value, "Hz", 1.0, "rate")
+
+    @field_validator("name")
+    @classmethod
+    def _plain(cls, value: str) -> str:
+        return plain_name(value)
+
+    @field_validator("duration")
+    @classmethod
+    def _long(cls, value: Quantity) -> Quantity:
+        _checked(value, "s", 0.0, "duration")
+        if parse_quantity(value, "s") < 1.0:
+            raise ValueError(f"duration = {value}: a log lasts 1 s at least")
+        return value
+
+
+_Load = BacklashStep | BrakeStep | SpringStep | WeightsStep | ForceStep | RigStep
+Step = Annotated[
+    _Load | SettingsStep | SensorStep | TraceStep,
+    Field(discriminator="kind"),
+]
