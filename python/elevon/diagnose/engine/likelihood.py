@@ -4,7 +4,8 @@ A fault's model error has three parts: one that scales the whole shift (`Candida
 carried exactly by the matrix determinant lemma, one of each number on its own (what the current
 loop makes of a ripple, say), and strays: a few numbers that the fault moves although the model does
 not, or not so, by a share of its whole shift. The latter two are carried at the best severities,
-which are searched again with them.
+which are searched again with them: a short's interval is 15 % wider than with errors that grow with
+its severity, and its upper end half a deviation higher.
 """
 
 from __future__ import annotations
