@@ -70,7 +70,7 @@ def test_a_row_has_both_numbers_its_verdict_and_why():
     rows = rows_of(RECORD, [Check("a b", 0.1, 0.05, "K", ours=0.94), Check("a c", 0.1, 0.84, "K")])
     assert (rows[0].paper, rows[0].item, rows[0].ours, rows[0].theirs) == (
         "nasa", "Figure 9", 0.94, "0.84 K")  # fmt: skip
-    assert (rows[0].verdict, rows[0].reason) == ("fail", "0.1 K is above 0.05 K")
+    assert (rows[0].verdict, rows[0].reason) == ("fail", "0.1 is above 0.05 K")
     assert (rows[1].verdict, rows[1].ours, rows[1].reason) == ("pass", 0.1, "")
 
 
@@ -95,6 +95,23 @@ def test_what_has_no_data_is_not_run_and_no_failure(tmp_path):
     result = reproduce_everything([absent, good], tmp_path, seed=0, key="k")
     assert [row.verdict for row in result.rows] == ["not run", "pass"]
     assert result.status == "pass"
+
+
+def test_the_page_shows_failures_open_and_a_case_that_was_not_run_once(tmp_path):
+    checks = [Check(f"a {n}", n, 0.5, "K") for n in (0.1, 0.2, 0.9)]
+    judged = (
+        Judgement("a *", "nasa Figure 9", "", "error"),
+        Judgement("b", "nasa Figure 9", "", ""),
+    )
+    absent = CaseRun(Published("two", {}, (*judged, judged[1])), dict, "no data here")
+    reproduce_everything([run_of(RECORD, checks), absent], tmp_path, seed=0, key="k")
+    page = (tmp_path / "index.html").read_text()
+    failed = page.split("<h2>Checks that fail</h2>")[1].split("<h2>")[0]
+    assert "0.9 is above 0.5 K" in failed
+    assert "<details>" not in failed
+    other = page.split("<h2>Checks that were not run</h2>")[1].split("<h2>")[0]
+    assert other.count("no data here") == 1
+    assert page.count(">error<") == 2  # once for the three checks that share it, once for the other
 
 
 def test_it_goes_on_after_an_interruption_and_runs_nothing_twice(tmp_path):

@@ -34,6 +34,8 @@ class IndexRow:
         The number found; None where the case was not run.
     theirs : str
         What is printed, with its unit; empty where nothing is.
+    value : float or None
+        The check's value, such as the difference of both; None where the case was not run.
     limit : str
         What the check's value is held to.
     verdict : str
@@ -52,6 +54,7 @@ class IndexRow:
     check: str
     ours: float | None
     theirs: str
+    value: float | None
     limit: str
     verdict: str
     reason: str
@@ -231,9 +234,9 @@ def rows_without(record: Published, verdict: str, reason: str) -> list[IndexRow]
 
 def _row(record: Published, check: Check, judged: Judgement, link: str) -> IndexRow:
     paper, _, item = judged.item.partition(" ")
-    sign, unit = (">=" if check.at_least else "<="), f" {check.unit}".rstrip()
+    sign, unit = (">=" if check.at_least else "<="), f" {check.unit}".removesuffix(" 1").rstrip()
     beyond = "below" if check.at_least else "above"
-    why = f"{check.value:.5g}{unit} is {beyond} {check.limit:.5g}{unit}"
+    why = f"{check.value:.5g} is {beyond} {check.limit:.5g}{unit}"
     reason = "" if check.passed else f"{why}: {judged.known}" if judged.known else why
     return IndexRow(
         paper=paper,
@@ -242,6 +245,7 @@ def _row(record: Published, check: Check, judged: Judgement, link: str) -> Index
         check=check.name,
         ours=check.value if check.ours is None else check.ours,
         theirs=judged.theirs,
+        value=check.value,
         limit=f"{sign} {check.limit:.5g}{unit}",
         verdict=PASS if check.passed else FAIL,
         reason=reason,
@@ -254,5 +258,5 @@ def _without(
     record: Published, judged: Judgement, verdict: str, reason: str, link: str
 ) -> IndexRow:
     paper, _, item = judged.item.partition(" ")
-    return IndexRow(paper, item, record.name, judged.check, None, judged.theirs, "", verdict,
-                    reason, judged.definition, link)  # fmt: skip
+    return IndexRow(paper, item, record.name, judged.check, None, judged.theirs, None, "",
+                    verdict, reason, judged.definition, link)  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
@@ -12,7 +14,7 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from elevon.reproduce.everything import EveryCase, IndexRow
 
-_COLUMNS = ("item", "case", "check", "ours", "theirs", "limit", "verdict", "reason", "definition")
+_COLUMNS = ("item", "case", "check", "ours", "theirs", "value", "limit", "verdict", "definition")
 
 
 def index_page(result: EveryCase, date: str | None) -> Report:
@@ -22,11 +24,8 @@ def index_page(result: EveryCase, date: str | None) -> Report:
     report = Report("Published results, recomputed", f"Checks: {lead}.", date=date)
     for name, number in counts.items():
         report.fact(name, str(number))
-    wrong = [[row.case, row.check, row.verdict, row.reason] for row in result.rows
-             if row.verdict != "pass"]  # fmt: skip
-    if wrong:
-        columns = ("case", "check", "verdict", "reason")
-        report.section("Rows that do not pass").table(ReportTable(columns, wrong))
+    _failed(report, [row for row in result.rows if row.verdict == "fail"])
+    _not_run(report, [row for row in result.rows if row.verdict == "not run"])
     for work in works():
         rows = [row for row in result.rows if row.paper == work.name]
         if rows:
@@ -38,10 +37,38 @@ def index_page(result: EveryCase, date: str | None) -> Report:
     return report
 
 
+def _failed(report: Report, rows: list[IndexRow]) -> None:
+    columns = ("case", "check", "reason")
+    cells = [[_cell(row, name) for name in columns] for row in rows]
+    if cells:
+        report.section("Checks that fail").table(ReportTable(columns, cells))
+
+
+def _not_run(report: Report, rows: list[IndexRow]) -> None:
+    """One row a case and reason: a case that did not run has one reason for all its checks."""
+    counts = Counter((row.case, row.reason) for row in rows)
+    cells = [[case, count, reason] for (case, reason), count in counts.items()]
+    if cells:
+        report.section("Checks that were not run").table(
+            ReportTable(("case", "checks", "reason"), cells)
+        )
+
+
 def _table(rows: list[IndexRow]) -> ReportTable:
-    cells = [[_cell(row, name) for name in _COLUMNS] for row in rows]
+    """Every check of a work; a definition stands at the first of the checks that share it."""
+    before = [None, *rows]
+    rows = [
+        replace(row, definition="") if last and _same(last, row) else row
+        for last, row in zip(before, rows, strict=False)
+    ]
+    columns = [name for name in _COLUMNS if any(_cell(row, name) not in ("", None) for row in rows)]
+    cells = [[_cell(row, name) for name in columns] for row in rows]
     marked = frozenset(n for n, row in enumerate(rows) if row.verdict == "fail")
-    return ReportTable(_COLUMNS, cells, marked=marked, folded=_counts(rows))
+    return ReportTable(columns, cells, marked=marked, folded=_counts(rows))
+
+
+def _same(one: IndexRow, other: IndexRow) -> bool:
+    return (one.case, one.definition) == (other.case, other.definition)
 
 
 def _counts(rows: list[IndexRow]) -> str:
@@ -55,6 +82,12 @@ def _cell(row: IndexRow, name: str) -> object:
     value = getattr(row, name)
     if name == "case" and row.link:
         return Markup('<a href="{}">{}</a>').format(quote(row.link), escape(value))
+    if name == "value" and row.value == row.ours:
+        return None  # it stands under "ours" already
+    if name == "limit":  # the sign stays beside its number
+        return value.replace("<= ", "\N{LESS-THAN OR EQUAL TO}\N{NO-BREAK SPACE}").replace(
+            ">= ", "\N{GREATER-THAN OR EQUAL TO}\N{NO-BREAK SPACE}"
+        )
     return value
 
 
