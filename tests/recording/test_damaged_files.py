@@ -9,6 +9,7 @@ import sys
 import textwrap
 import warnings
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -116,7 +117,15 @@ def test_damaged_files_are_a_clear_error_or_the_same_recording(tmp_path_factory,
     except FormatError as error:
         assert str(path) in str(error)  # noqa: PT017
         return
-    assert loaded.equals(whole)
+    assert loaded.equals(whole) or (loaded.meta, bits(loaded)) == (whole.meta, bits(whole))
+
+
+def bits(recording):
+    """The values, every NaN as one: not all formats keep its payload, so no checksum has it."""
+    return {
+        name: np.where(np.isnan(recording[name].values), np.nan, recording[name].values).tobytes()
+        for name in recording
+    }
 
 
 @given(data=st.data())
