@@ -22,7 +22,7 @@ _SOUND = {
     "columns": "they agree with each other",
 }
 _EVEN = 1e-6  # share of a period: what rounding leaves
-_MOST = 6  # findings that are told of one question
+_MOST = 6  # findings stated for one question
 
 
 def checks_of(name: str, log: ForeignLog) -> list[DataCheck]:

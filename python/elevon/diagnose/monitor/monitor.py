@@ -202,7 +202,7 @@ class Monitor:
             self._cutter.pending += SampleCounts(unreadable=count)
 
     def finish(self) -> list[MonitorStep]:
-        """Say that no more samples come for now; return the step of a last window that is whole."""
+        """End the stream here; return the step of a last window that is whole."""
         return [] if self._cutter is None else self._stepped(self._cutter.finish())
 
     def save(self, path: str | os.PathLike[str]) -> None:

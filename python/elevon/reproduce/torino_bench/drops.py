@@ -31,7 +31,7 @@ from elevon.reproduce.torino_bench.unit import (
     ACTUATOR,
     READINGS,
     bench_logs,
-    calibration_steps,
+    hidden_and_calibrated,
     micrometer,
     procedure_of,
     trace,
@@ -157,17 +157,11 @@ def reproduce_drops(*, seed: int = 0, progress: Progress | None = None) -> Drops
     SimulationError
         A run did not reach its end.
     """
-    from elevon.bench.hidden import hidden_actuator
     from elevon.bench.rig import draw_conditions
-    from elevon.calibrate import calibrate
 
-    base = Actuator.load(ACTUATOR)
-    unit = hidden_actuator(base, seed)
-    calibration = procedure_of("calibration", calibration_steps())
-    first = bench_logs(calibration, unit, seed=seed, progress=part(progress, 0.0, 0.3))
-    model = calibrate(first, base, progress=part(progress, 0.3, 0.5)).actuator
+    unit, model = hidden_and_calibrated(seed, part(progress, 0.0, 0.5))
     scale = np.random.default_rng([seed, 11]).uniform(*SPREAD, 2)
-    value = base.parameters.value
+    value = Actuator.load(ACTUATOR).parameters.value
     hidden = {path: value(path) * float(s)
               for path, s in zip((STIFFNESS, DAMPING), scale, strict=True)}  # fmt: skip
     elastic = unit.with_values(hidden, source="hidden from the calibration")

@@ -19,7 +19,11 @@ from elevon.plain import Plain
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.backlash.estimate import lost_motion
-from elevon.reproduce.torino_bench.unit import ACTUATOR, bench_logs, calibration_steps, procedure_of
+from elevon.reproduce.torino_bench.unit import (
+    ACTUATOR,
+    bench_logs,
+    hidden_and_calibrated,
+)
 from elevon.reproduce.torino_bench.validation import SHOWS, encoder_count
 
 PERIOD = 20.0
@@ -117,17 +121,11 @@ def reproduce_loaded(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.bench.hidden import hidden_actuator
     from elevon.bench.micrometer import INTRINSIC_BACKLASH
     from elevon.bench.procedure import load_procedure
-    from elevon.calibrate import calibrate
     from elevon.parameters.relations import motor_torque_constant
 
-    base = Actuator.load(ACTUATOR)
-    unit = hidden_actuator(base, seed)
-    calibration = procedure_of("calibration", calibration_steps())
-    first = bench_logs(calibration, unit, seed=seed, progress=part(progress, 0.0, 0.15))
-    model = calibrate(first, base, progress=part(progress, 0.15, 0.25)).actuator
+    unit, model = hidden_and_calibrated(seed, part(progress, 0.0, 0.25))
     logs = bench_logs(load_procedure("loaded-campaign"), unit, seed=seed + 1, fidelity=fidelity,
                       progress=part(progress, 0.25, 0.85))  # fmt: skip
     total, each = model.parameters.value("backlash.total"), len(logs) // len(NET)
@@ -139,8 +137,9 @@ def reproduce_loaded(
         rows.append(_row(drive_log(log), ready, net, torque))
         if progress is not None:
             progress(0.85 + 0.15 * (number + 1) / len(logs))
+    count = encoder_count(Actuator.load(ACTUATOR))
     return LoadedCampaign(rows, motor_torque_constant(model.parameters),
-                          math.degrees(INTRINSIC_BACKLASH), encoder_count(base), fidelity, seed,
+                          math.degrees(INTRINSIC_BACKLASH), count, fidelity, seed,
                           model.hash)  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from elevon.bench.procedure import Procedure
 from elevon.documents import Document, validated
 from elevon.errors import SimulationError
 from elevon.logs.log import Log
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 
 ACTUATOR = "torino-rotary"
 READINGS = (14.0, 12.4, 9.15)
@@ -48,6 +48,24 @@ def calibration_steps() -> list[dict[str, Any]]:
 def procedure_of(name: str, steps: Sequence[Mapping[str, Any]]) -> Procedure:
     """Return a procedure of steps."""
     return validated(Procedure, {"name": name, "step": list(steps)}, Document(name, "", {}))
+
+
+def hidden_and_calibrated(seed: int, progress: Progress | None = None) -> tuple[Actuator, Actuator]:
+    """Return a unit with hidden values, and the model calibrated on the bench's logs of it.
+
+    Raises
+    ------
+    SimulationError
+        A run did not reach its end.
+    """
+    from elevon.bench.hidden import hidden_actuator
+    from elevon.calibrate import calibrate
+
+    base = Actuator.load(ACTUATOR)
+    unit = hidden_actuator(base, seed)
+    procedure = procedure_of("calibration", calibration_steps())
+    logs = bench_logs(procedure, unit, seed=seed, progress=part(progress, 0.0, 0.6))
+    return unit, calibrate(logs, base, progress=part(progress, 0.6, 1.0)).actuator
 
 
 def bench_logs(

@@ -27,7 +27,7 @@ from elevon.reproduce.torino_bench.unit import (
     READINGS,
     SINE,
     bench_logs,
-    calibration_steps,
+    hidden_and_calibrated,
     micrometer,
     procedure_of,
     trace,
@@ -155,20 +155,14 @@ def reproduce_torino_validation(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.bench.hidden import hidden_actuator
-    from elevon.calibrate import calibrate
-
-    base = Actuator.load(ACTUATOR)
-    unit = hidden_actuator(base, seed)
+    unit, model = hidden_and_calibrated(seed, part(progress, 0.0, 0.45))
     steps = []
     for reading in READINGS:
         name = f"at-{reading:g}-mm".replace(".", "-")
         steps += [micrometer(reading), trace(name, SINE, DURATION)]
-    procedures = procedure_of("calibration", calibration_steps()), procedure_of("validation", steps)
-    first = bench_logs(procedures[0], unit, seed=seed, progress=part(progress, 0.0, 0.25))
-    judged = bench_logs(procedures[1], unit, seed=seed + 1, progress=part(progress, 0.25, 0.5))
-    model = calibrate(first, base, progress=part(progress, 0.5, 0.7)).actuator
-    count = encoder_count(base)
+    judged = bench_logs(procedure_of("validation", steps), unit, seed=seed + 1,
+                        progress=part(progress, 0.45, 0.7))  # fmt: skip
+    count = encoder_count(Actuator.load(ACTUATOR))
     curves, rows, facts = [], [], []
     for number, (reading, log) in enumerate(zip(READINGS, judged, strict=True)):
         share = part(progress, 0.7 + 0.1 * number, 0.8 + 0.1 * number)

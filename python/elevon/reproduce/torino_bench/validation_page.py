@@ -32,7 +32,7 @@ def torino_validation_page(result: TorinoValidation, *, date: str | None = None)
         "Bench against model at three backlashes",
         "The works draw measured and simulated curves; their signals were not published. Measured "
         "here means the virtual bench with hidden values. The model was calibrated on other logs, "
-        "at the least backlash, and shares with the bench its equations: what is shown is the "
+        "at the least backlash, and shares with the bench its equations: what is judged is the "
         "procedure and what it leaves over, not how good the works' own model is.",
         date=date,
     )
