@@ -34,6 +34,9 @@ _HEALTHY = Annotated[int, typer.Option("--healthy", min=4, help="Healthy logs of
 _SWITCHING = Annotated[
     int, typer.Option("--switching", min=0, help="Healthy logs of the screw and of the gear.")
 ]
+_LEARNT = Annotated[
+    int, typer.Option("--learned", min=0, help="Days of each test that a spread is learnt from.")
+]
 _INSPECTED = Annotated[int, typer.Option("--units", min=2, help="Benches, 40 inspections each.")]
 _PAIRED = Annotated[int, typer.Option("--units", min=2, help="Units of every pair.")]
 _FOLDER = Annotated[
@@ -105,16 +108,18 @@ def independent(
     units: int,
     healthy: int,
     switching: int,
+    learned: int,
     seed: int,
     *,
     processes: int | None = None,
+    folder: Path | None = None,
     progress: Progress | None = None,
 ) -> Any:
     """Return diagnosis judged by a plan of these numbers."""
     from studies.independent import Plan, study_independent
 
-    plan = Plan(units, healthy, switching, seed)
-    return study_independent(plan, processes=processes, progress=progress)
+    plan = Plan(units, healthy, switching, seed, learned)
+    return study_independent(plan, folder=folder, processes=processes, progress=progress)
 
 
 def _save_independent(result: Any, options: Options) -> None:
@@ -122,7 +127,7 @@ def _save_independent(result: Any, options: Options) -> None:
     from studies.independent.table import independent_table
 
     if options["table"] is not None:
-        names = ("units", "healthy", "switching", "seed")
+        names = ("units", "healthy", "switching", "learned", "seed")
         numbers = " ".join(f"--{name} {options[name]}" for name in names)
         text = independent_table(result, f"python -m studies independent {numbers}")
         write_text(options["table"], text, force=options["force"])
@@ -218,9 +223,12 @@ _STUDIES = (
             "units": (_FOREIGN, 4),
             "healthy": (_HEALTHY, 17),
             "switching": (_SWITCHING, 60),
+            "learned": (_LEARNT, 7),
             "processes": (_PROCESSES, None),
+            "runs": (_FOLDER, None),
             "table": (_TABLE, None),
         },
+        names={"folder": "runs"},
         prepare=lambda options: check_file(options["table"], options),
         finish=_save_independent,
     ),

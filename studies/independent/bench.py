@@ -8,8 +8,9 @@ counts, and files of its own. What a day changes is stated here, apart from `eng
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ _WHEEL, _PINION = math.radians(0.01), math.radians(0.002)  # largest errors at t
 #: Deviations from day to day, ASSUMED before any log was diagnosed: 12 K of winding, 8 K of
 #: magnets (-0.1 %/K), friction by 5 %, grease by 10 %, current sensors by 0.3 % and 20 mA.
 _WINDING, _MAGNETS, _DRY, _VISCOUS, _GAIN, _OFFSET = 12.0 * 0.0039, 8e-3, 0.05, 0.10, 0.003, 0.02
+AND = " and "
 _WARMING = 1e-3  # largest growth of the resistance in a second
 
 
@@ -187,7 +189,7 @@ class Injected:
 
 
 def injected(unit: Unit) -> list[Injected]:
-    """Return single faults that this program can have, each at a clear severity."""
+    """Return the faults that this program can have, each at a clear severity."""
     growth, b = math.radians(0.13), unit.bench
     return [
         Injected("backlash@transmission", growth,
@@ -198,3 +200,20 @@ def injected(unit: Unit) -> list[Injected]:
         Injected("gain@sensor.encoder", 0.01, Cause("encoder", None, {"encoder_gain": 1.01})),
         Injected("gain_drift@control.speed", 0.4, Cause("speed gain", {"speed_gain": 1.4})),
     ]  # fmt: skip
+
+
+def singles(unit: Unit) -> list[tuple[Injected, ...]]:
+    """Return each fault by itself."""
+    return [(fault,) for fault in injected(unit)]
+
+
+def pairs(unit: Unit) -> list[tuple[Injected, ...]]:
+    """Return all pairs of faults."""
+    return list(combinations(injected(unit), 2))
+
+
+def together(faults: Sequence[Injected]) -> Cause:
+    """Return what faults do to the bench at once; no two of them move the same field."""
+    bench, sensors = ({k: v for f in faults for k, v in (getattr(f.cause, of) or {}).items()}
+                      for of in ("bench", "sensors"))  # fmt: skip
+    return Cause(AND.join(f.key for f in faults), bench, sensors)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,18 +20,34 @@ from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.errors import ElevonWarning, InputError
 from elevon.progress import Progress
 from elevon.threads import one_blas_thread
+from elevon.worklog import finished
 from studies.common import Row
-from studies.independent.bench import CAUSES, RATES, TESTS, Cause, Unit, injected, units, written
+from studies.independent.bench import (
+    AND,
+    CAUSES,
+    RATES,
+    TESTS,
+    Cause,
+    Injected,
+    Unit,
+    pairs,
+    singles,
+    together,
+    units,
+    written,
+)
 from studies.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.engine.answer import Diagnosis
     from elevon.diagnose.engine.reading import Reading
+    from elevon.diagnose.engine.spread import LearnedSpread
     from elevon.logs.log import Log
     from studies.independent.result import IndependentResult
 
 _RATE = 0.05  # of false alarms that is set
+_ALWAYS = (1, 3)  # baselines that every healthy log is given
 _BEYOND = 5.0  # deviations of the unit's healthy days, of one feature: a cause has moved the log
 #: Actuators whose logs the switching model makes, for want of another program: test of each.
 SWITCHING = (("nasa-ballscrew", "sine-opposing"), ("pisa-landing-gear", "extension-nominal"))
@@ -45,19 +61,31 @@ class Plan:
     ----------
     units, healthy : int
         Units of the foreign bench; healthy logs of each in each of three tests.
-    baselines : tuple of int
-        Numbers of baselines; without one a sixth of the logs is diagnosed.
     switching : int
         Healthy logs of each other actuator, by the switching model.
     seed : int
         Of everything.
+    learned : int
+        Days of each test from which a unit's spread is learnt, none of them judged or a baseline.
+    baselines : tuple of int
+        Numbers of baselines; other than one and three for a third of the logs.
     """
 
     units: int
     healthy: int
     switching: int
     seed: int
-    baselines: tuple[int, ...] = (0, 1, 3)
+    learned: int = 7
+    baselines: tuple[int, ...] = (0, 1, 3, 10)
+
+    @property
+    def key(self) -> str:
+        """What tells its work from another's; units do not know how many they are."""
+        return f"independent {replace(self, units=0)}"
+
+    def counts(self, number: int) -> list[int]:
+        """Return how many baselines the healthy log of a number is given."""
+        return [b for b in self.baselines if b in _ALWAYS or number < self.healthy // 3]
 
 
 @dataclass(frozen=True)
@@ -69,9 +97,9 @@ class Judged(Row):
     program : str
         That made the log: ``foreign``, or the actuator of the switching model.
     what : str
-        ``healthy``, ``fault`` or ``cause``.
+        ``healthy``, ``fault``, ``pair`` or ``cause``.
     name, test : str
-        Of the fault or cause; of the test.
+        Of the faults (joined by `AND`) or cause; of the test.
     unit, rate, baselines : int, float, int
         Number of the unit, Hz of its logs, baselines.
     status, best : str, tuple of str
@@ -81,9 +109,11 @@ class Judged(Row):
     moved : bool
         Whether the log is beyond the unit's healthy days.
     covered : bool
-        Whether the true severity lies in its interval.
+        Whether each true severity lies in its interval.
     seconds : float
         Processor time.
+    learned : bool
+        Whether the spread was learnt from the unit's other days.
     """
 
     program: str
@@ -100,12 +130,19 @@ class Judged(Row):
     moved: bool
     covered: bool
     seconds: float
+    learned: bool = False
 
 
 def study_independent(
-    plan: Plan, *, processes: int | None = None, progress: Progress | None = None
+    plan: Plan,
+    *,
+    folder: Path | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
 ) -> IndependentResult:
     """Judge diagnosis on units, days and causes of another program.
+
+    With a folder, finished units and actuators are noted there, and interrupted work goes on.
 
     Raises
     ------
@@ -122,9 +159,17 @@ def study_independent(
     calls = {f"unit {u.number}": partial(_of_unit, u, plan) for u in units(plan.seed, plan.units)}
     for name, test in SWITCHING if plan.switching else ():
         calls[name] = partial(_switching, name, test, plan)
-    rows: dict[str, list[Judged]] = dict(
-        side_by_side(calls, processes=processes, progress=progress)
-    )
+    rows: dict[str, list[Judged]] = {}
+    with finished(folder, plan.key) as done:
+        noted = {} if done is None else done.items
+        rows |= {
+            n: [Judged.from_dict(r) for r in noted[n].data["rows"]] for n in calls if n in noted
+        }
+        left = {name: call for name, call in calls.items() if name not in rows}
+        for name, judged in side_by_side(left, processes=processes, progress=progress):
+            rows[name] = judged
+            if done is not None:
+                done.note(name, [], rows=[row.to_dict() for row in judged])
     judged = tuple(row for name in calls for row in rows[name])
     return IndependentResult(judged, plan, clock.perf_counter() - begin)
 
@@ -133,29 +178,44 @@ def study_independent(
 def _of_unit(unit: Unit, plan: Plan) -> list[Judged]:
     """Calibrate a unit on a log of each test, then judge its other days."""
     from elevon import calibrate
+    from elevon.diagnose.learning.spread import learned_spread
 
     out: list[Judged] = []
     with TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", ElevonWarning)
         make = _Maker(unit, Path(folder), plan.seed).log
-        first = [make(test, 0) for test in TESTS]
-        actuator = calibrate(first, "torino-rotary").actuator
-        for k, test in enumerate(TESTS):
+        actuator = calibrate([make(test, 0) for test in TESTS], "torino-rotary").actuator
+        others = [make(test, 50 + n) for test in TESTS for n in range(plan.learned)]
+        spread = learned_spread(others, actuator) if others else None
+        for test in TESTS:
             base = [reading_of(make(test, 1 + n), actuator) for n in range(max(plan.baselines))]
-            judge = _Judge(unit, test, actuator, base).of
-            days = [make(test, 100 + n) for n in range(plan.healthy)]
-            for n, log in enumerate(days):
-                counts = [b for b in plan.baselines if b or n < plan.healthy // 6]
-                out += [judge("healthy", "", log, b) for b in counts]
-            usual = _usual([*base, *(reading_of(log, actuator) for log in days)])
-            for n, fault in enumerate(injected(unit)):
-                if n % 2 == (unit.number + k) % 2:
-                    log = make(test, 1000 + n, fault.cause)
-                    out.append(judge("fault", fault.key, log, 1, severity=fault.severity))
-            for n, cause in enumerate(CAUSES):
-                if (n + unit.number * len(TESTS) + k) % 6 == 0:
-                    log = make(test, 2000 + n, cause)
-                    out.append(judge("cause", cause.name, log, 1, usual=usual))
+            out += _of_test(_Judge(unit, test, actuator, base, spread), plan, make)
+    return out
+
+
+def _of_test(judge: _Judge, plan: Plan, make: Callable[..., Log]) -> list[Judged]:
+    """Judge a unit's other days in one test: healthy, with one fault, with two, with a cause."""
+    test, turn = judge.test, list(TESTS).index(judge.test)
+    days = [make(test, 100 + n) for n in range(plan.healthy)]
+    out = []
+    for n, log in enumerate(days):
+        out += [judge.of("healthy", "", log, b) for b in plan.counts(n)]
+        if judge.spread is not None:
+            out.append(judge.of("healthy", "", log, 1, learned=True))
+    usual = _usual([*judge.base, *(reading_of(log, judge.actuator) for log in days)])
+    for n, faults in enumerate(singles(judge.unit)):
+        if n % 2 == (judge.unit.number + turn) % 2:
+            log = make(test, 1000 + n, together(faults))
+            out.append(judge.injected(faults, log))
+            if judge.spread is not None:
+                out.append(judge.injected(faults, log, learned=True))
+    for n, faults in enumerate(pairs(judge.unit)):
+        if n % 5 == (judge.unit.number + turn) % 5:
+            out.append(judge.injected(faults, make(test, 1500 + n, together(faults))))
+    for n, cause in enumerate(CAUSES):
+        if (n + judge.unit.number * len(TESTS) + turn) % 6 == 0:
+            log = make(test, 2000 + n, cause)
+            out.append(judge.of("cause", cause.name, log, 1, usual=usual))
     return out
 
 
@@ -192,6 +252,13 @@ class _Judge:
     test: str
     actuator: Actuator
     base: Sequence[Reading]
+    spread: LearnedSpread | None = None
+
+    def injected(self, faults: Sequence[Injected], log: Log, *, learned: bool = False) -> Judged:
+        """Return the answer to a log with one fault or two."""
+        truth = {fault.key: fault.severity for fault in faults}
+        what = "fault" if len(faults) == 1 else "pair"
+        return self.of(what, AND.join(truth), log, 1, truth=truth, learned=learned)
 
     def of(
         self,
@@ -201,18 +268,19 @@ class _Judge:
         count: int,
         *,
         usual: dict[str, tuple[float, float]] | None = None,
-        severity: float | None = None,
+        truth: dict[str, float] | None = None,
+        learned: bool = False,
     ) -> Judged:
         """Return the answer to a log with so many baselines."""
         begin = clock.process_time()
         row = Judged("foreign", what, name, self.test, self.unit.number, self.unit.rate, count,
-                     "refused", (), 0.0, 0.0, True, False, 0.0)  # fmt: skip
+                     "refused", (), 0.0, 0.0, True, False, 0.0, learned)  # fmt: skip
+        spread = self.spread if learned else None
         try:
             item = reading_of(log, self.actuator)
-            answer = _answer(item, self.actuator, self.base[:count])
+            answer = _answer(item, self.actuator, self.base[:count], spread)
         except InputError:
             return row
-        ends = [c.interval for c in answer.faults if f"{c.kind}@{c.place}" == name]
         return replace(
             row,
             status=answer.status,
@@ -220,9 +288,15 @@ class _Judge:
             p_other=answer.p_other,
             most=max([c.probability for c in answer.faults], default=0.0),
             moved=usual is not None and _far(item, usual) > _BEYOND,
-            covered=severity is not None and any(low <= severity <= high for low, high in ends),
+            covered=truth is not None and _covered(answer, truth),
             seconds=clock.process_time() - begin,
         )
+
+
+def _covered(answer: Diagnosis, truth: dict[str, float]) -> bool:
+    """Whether the answer lists all faults, each with an interval that holds its severity."""
+    ends = {f"{c.kind}@{c.place}": c.interval for c in answer.faults}
+    return all(k in ends and ends[k][0] <= x <= ends[k][1] for k, x in truth.items())
 
 
 def _far(item: Reading, usual: dict[str, tuple[float, float]]) -> float:
@@ -231,9 +305,11 @@ def _far(item: Reading, usual: dict[str, tuple[float, float]]) -> float:
     return float(max(abs(v - usual[n][0]) / usual[n][1] for n, v in seen if n in usual))
 
 
-def _answer(item: Reading, actuator: Actuator, base: Sequence[Reading]) -> Diagnosis:
+def _answer(
+    item: Reading, actuator: Actuator, base: Sequence[Reading], spread: LearnedSpread | None
+) -> Diagnosis:
     candidates = candidates_of(actuator)
-    return answer_of([case_of(item, candidates, base)], candidates, _RATE)
+    return answer_of([case_of(item, candidates, base, spread)], candidates, _RATE, spread)
 
 
 @one_blas_thread()
@@ -244,7 +320,7 @@ def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
 
     actuator = Actuator.load(name)
     test = next(t for t in standard_tests(actuator) if t.name == title)
-    most = max(plan.baselines)
+    most = max(_ALWAYS)
     days = [Day((), 100_000 * plan.seed + n) for n in range(most + plan.switching)]
     unit = Unit(0, None, None, RATES[0])
     with warnings.catch_warnings():
@@ -253,10 +329,5 @@ def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
         base = [replace(log, name=f"baseline {k}") for k, log in enumerate(logs[:most])]
         first = [reading_of(log, actuator) for log in base]
         judge = _Judge(unit, title, actuator, first).of
-        rows = [
-            judge("healthy", "", log, count)
-            for log in logs[most:]
-            for count in plan.baselines
-            if count
-        ]
+        rows = [judge("healthy", "", log, count) for log in logs[most:] for count in _ALWAYS]
     return [replace(row, program=name) for row in rows]

@@ -26,7 +26,7 @@ def independent_report(result: IndependentResult, *, seed: int, date: str | None
     plan = result.plan
     text = (
         f"python -m studies independent --units {plan.units} --healthy {plan.healthy} "
-        f"--switching {plan.switching} --seed {plan.seed}"
+        f"--switching {plan.switching} --learned {plan.learned} --seed {plan.seed}"
     )
     report.provenance(provenance(text, Seed=seed))
     return report

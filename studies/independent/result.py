@@ -10,11 +10,14 @@ import numpy as np
 
 from elevon.diagnose.modelfree.scores import share_interval
 from elevon.report.checks import Check, verdict
+from studies.independent.bench import AND
 from studies.independent.campaign import Judged, Plan
 
 _ALARMS = ("faulty", "unknown_fault")
 _GATE = "model_does_not_fit"
 _SET, _UNKNOWN, _NAMED, _ISOLATED, _SECOND, _SECONDS = 0.05, 0.8, 0.9, 0.9, 0.03, 0.5
+_PAIRS, _SLOW = 0.8, 2.0
+_LEARNED = ", spread learnt"
 _COVERED = (0.85, 0.95)
 
 
@@ -46,14 +49,7 @@ class IndependentResult:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """Counts with their 95 % intervals."""
-        out = []
-        for program in dict.fromkeys(r.program for r in self.judged):
-            for count in self.plan.baselines:
-                logs = self.of("healthy", program=program, baselines=count)
-                if logs:
-                    text = f"{program}, healthy, {count} baselines"
-                    out.append(_row(f"{text}: alarms", [r.status in _ALARMS for r in logs]))
-                    out.append(_row(f"{text}: gated", [r.status == _GATE for r in logs]))
+        out = self._healthy()
         moved = [r for r in self.of("cause") if r.moved]
         out.append(_row("causes that move the log: unknown", [_unknown(r) for r in moved]))
         out.append(_row("the same: called healthy", [r.status == "healthy" for r in moved]))
@@ -62,11 +58,29 @@ class IndependentResult:
         out.append(
             _row("causes that do not move it: alarms", [r.status in _ALARMS for r in unmoved])
         )
-        faults = self.of("fault")
-        out.append(_row("single faults isolated", [r.best == (r.name,) for r in faults]))
-        right = [r for r in faults if r.name in r.best]
-        out.append(_row("their intervals hold the severity", [r.covered for r in right]))
-        out.append(_row("a wrong second fault", [len(r.best) > 1 for r in faults]))
+        for learned, tail in ((False, ""), (True, _LEARNED)):
+            faults = self.of("fault", learned=learned)
+            right = [r for r in faults if r.name in r.best]
+            if faults or not learned:
+                out.append(_row(f"single faults isolated{tail}", [_isolated(r) for r in faults]))
+                out.append(
+                    _row(f"their intervals hold the severity{tail}", [r.covered for r in right])
+                )
+                out.append(_row(f"a wrong second fault{tail}", [len(r.best) > 1 for r in faults]))
+        out.append(_row("pairs of faults isolated", [_isolated(r) for r in self.of("pair")]))
+        return out
+
+    def _healthy(self) -> list[dict[str, Any]]:
+        """Healthy logs called faulty or unknown, and gated ones, by program and baselines."""
+        out = []
+        for program in dict.fromkeys(r.program for r in self.judged):
+            for learned, tail in ((False, ""), (True, _LEARNED)):
+                for count in self.plan.baselines:
+                    logs = self.of("healthy", program=program, baselines=count, learned=learned)
+                    if logs:
+                        text = f"{program}, healthy, {count} baselines{tail}"
+                        out.append(_row(f"{text}: alarms", [r.status in _ALARMS for r in logs]))
+                        out.append(_row(f"{text}: gated", [r.status == _GATE for r in logs]))
         return out
 
     @property
@@ -85,7 +99,6 @@ class IndependentResult:
                 out.append(Check(f"{name}: lower end of 95 %", row["interval"][0], _SET))
         share = {name: row["share"] for name, row in known.items()}
         low, high = known["their intervals hold the severity"]["interval"]
-        seconds = [r.seconds for r in self.judged if r.baselines and r.program == "foreign"]
         out += [
             Check("unknown of causes that move the log",
                   share["causes that move the log: unknown"], _UNKNOWN, at_least=True),
@@ -95,8 +108,14 @@ class IndependentResult:
             Check("coverage: upper end of 95 %", high, _COVERED[0], at_least=True),
             Check("coverage: lower end of 95 %", low, _COVERED[1]),
             Check("a wrong second fault", share["a wrong second fault"], _SECOND),
-            Check("median processor time with a baseline [s]", float(np.median(seconds)), _SECONDS),
+            Check("pairs of faults isolated", share["pairs of faults isolated"], _PAIRS,
+                  at_least=True),
         ]  # fmt: skip
+        for name in dict.fromkeys(r.program for r in self.judged):
+            logs = [r for r in self.judged if r.program == name and r.baselines == 1]
+            seconds = float(np.median([r.seconds for r in logs if not r.learned]))
+            limit = _SLOW if name == "pisa-landing-gear" else _SECONDS
+            out.append(Check(f"{name}: median processor time, one baseline [s]", seconds, limit))
         return out
 
     def to_dict(self) -> dict[str, Any]:
@@ -109,6 +128,11 @@ class IndependentResult:
             "judged": [row.to_dict() for row in self.judged],
             "seconds": self.seconds,
         }
+
+
+def _isolated(row: Judged) -> bool:
+    """Whether an answer names what was injected and nothing else."""
+    return set(row.best) == set(row.name.split(AND))
 
 
 def _unknown(row: Judged) -> bool:

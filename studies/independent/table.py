@@ -19,7 +19,8 @@ kHz. Each unit is calibrated on a log of each of three tests; all other logs are
 Intervals are of 95 %. Alarms are `faulty` and `unknown_fault`; gated is `model_does_not_fit`. A
 cause moves the log where one feature lies beyond five deviations of the unit's healthy days;
 unknown is `unknown_fault`, `model_does_not_fit`, a refused log, or `p_other` of one half and
-more. The screw's and the gear's logs are the package's own switching model's, so that part is no
+more. `spread learnt`: by `learn-spread` on {learned} other days of each test of the same unit. The
+screw's and the gear's logs are the package's own switching model's, so that part is no
 independent judgement.
 
 | what | found | share | interval |
@@ -34,7 +35,7 @@ _CAUSES = """
 
 def independent_table(result: IndependentResult, command: str) -> str:
     """Return the page: shares, checks, and every cause with its answer."""
-    lines = [_HEAD.format(command=command)]
+    lines = [_HEAD.format(command=command, learned=result.plan.learned)]
     for row in result.rows:
         low, high = row["interval"]
         share = f"{100 * row['share']:.1f} %" if row["logs"] else "-"

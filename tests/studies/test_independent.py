@@ -1,13 +1,26 @@
 """The study on logs of another program: its counts, its page, and one small run of it."""
 
+from dataclasses import replace
+
 import pytest
 
 from studies.independent import IndependentResult, Plan, study_independent
-from studies.independent.bench import CAUSES, TESTS, changed, injected, of_day, units
+from studies.independent.bench import (
+    AND,
+    CAUSES,
+    TESTS,
+    changed,
+    injected,
+    of_day,
+    pairs,
+    singles,
+    together,
+    units,
+)
 from studies.independent.campaign import Judged
 from studies.independent.table import independent_table
 
-PLAN = Plan(1, 4, 0, 7)
+PLAN = Plan(1, 4, 0, 7, 2, (0, 1, 3))
 
 
 def judged(what, name="", status="healthy", best=(), p_other=0.0, most=0.0, moved=True):
@@ -23,6 +36,9 @@ def test_counts_are_those_of_the_answers():
         judged("cause", "a", "unknown_fault"), judged("cause", "b", "faulty", (key,), most=0.95),
         judged("cause", "c", "faulty", (key,), p_other=0.5), judged("cause", "d", moved=False),
         judged("fault", key, "faulty", (key,)), judged("fault", key, "faulty", (key, "x@y")),
+        judged("pair", f"{key}{AND}x@y", "faulty", ("x@y", key)),
+        judged("pair", f"{key}{AND}x@y", "faulty", (key,)),
+        replace(judged("healthy", status="faulty"), learned=True),
     ]  # fmt: skip
     result = IndependentResult(tuple(rows), PLAN, 1.0)
     found = {row["what"]: (row["hits"], row["logs"]) for row in result.rows}
@@ -32,9 +48,37 @@ def test_counts_are_those_of_the_answers():
     assert found["the same: a candidate above 0.9"] == (1, 3)
     assert found["single faults isolated"] == (1, 2)
     assert found["a wrong second fault"] == (1, 2)
+    assert found["pairs of faults isolated"] == (1, 2)
+    assert found["foreign, healthy, 1 baselines, spread learnt: alarms"] == (1, 1)
     page = independent_table(result, "python -m studies independent")
     assert "| causes that move the log: unknown | 2 of 3 | 66.7 % |" in page
     assert page.count("| yes |") + page.count("| no |") >= len(result.checks)
+
+
+def test_two_faults_move_the_bench_as_each_does():
+    unit = units(3, 1)[0]
+    assert len(pairs(unit)) == 15
+    for faults in [*singles(unit), *pairs(unit)]:
+        both = changed(unit.bench, unit.sensors, together(faults))
+        one = (unit.bench, unit.sensors)
+        for fault in faults:
+            one = changed(*one, fault.cause)
+        assert both == one
+
+
+def test_units_already_judged_are_not_judged_again(tmp_path, monkeypatch):
+    made = []
+
+    def unit_rows(unit, plan):
+        made.append(unit.number)
+        return [judged("healthy")]
+
+    monkeypatch.setattr("studies.independent.campaign._of_unit", unit_rows)
+    for count in (1, 2):
+        plan = replace(PLAN, units=count)
+        result = study_independent(plan, folder=tmp_path / "runs", processes=1)
+        assert len(result.judged) == count
+    assert made == [0, 1]
 
 
 def test_causes_and_faults_change_the_bench_that_they_name():
