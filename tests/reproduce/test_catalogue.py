@@ -8,8 +8,9 @@ import typer
 from elevon.cli import main
 from elevon.cli.reproduce.cases import CASES
 from elevon.cli.runner import app
-from elevon.errors import InputError
+from elevon.errors import InputError, OutputExistsError
 from elevon.report.checks import Check
+from elevon.reproduce import everything
 from elevon.reproduce.catalogue import Judgement, Published, published, works
 from elevon.reproduce.everything import CaseRun, reproduce_everything, rows_of
 
@@ -68,10 +69,16 @@ RECORD = Published("one", {}, (Judgement("a *", "nasa Figure 9", "0.84 K", "erro
 
 def test_a_row_has_both_numbers_its_verdict_and_why():
     rows = rows_of(RECORD, [Check("a b", 0.1, 0.05, "K", ours=0.94), Check("a c", 0.1, 0.84, "K")])
-    assert (rows[0].paper, rows[0].item, rows[0].ours, rows[0].theirs) == (
-        "nasa", "Figure 9", 0.94, "0.84 K")  # fmt: skip
-    assert (rows[0].verdict, rows[0].reason) == ("fail", "0.1 is above 0.05 K")
+    assert (rows[0].paper, rows[0].item, rows[0].ours, rows[0].unit, rows[0].theirs) == (
+        "nasa", "Figure 9", 0.94, "K", "0.84 K")  # fmt: skip
+    why = "0.1 is above 0.05 K: no reason is known"
+    assert (rows[0].verdict, rows[0].reason) == ("fail", why)
     assert (rows[1].verdict, rows[1].ours, rows[1].reason) == ("pass", 0.1, "")
+
+
+def test_our_number_has_its_own_unit():
+    checks = [Check("a b", 0.1, 0.5, "1", ours=3.0, ours_unit="1/s"), Check("a c", 0.1, 0.5, "1")]
+    assert [row.unit for row in rows_of(RECORD, checks)] == ["1/s", ""]
 
 
 def test_a_check_that_was_not_made_is_not_run():
@@ -107,7 +114,7 @@ def test_the_page_shows_failures_open_and_a_case_that_was_not_run_once(tmp_path)
     reproduce_everything([run_of(RECORD, checks), absent], tmp_path, seed=0, key="k")
     page = (tmp_path / "index.html").read_text()
     failed = page.split("<h2>Checks that fail</h2>")[1].split("<h2>")[0]
-    assert "0.9 is above 0.5 K" in failed
+    assert "0.9 is above 0.5 K: no reason is known" in failed
     assert "<details>" not in failed
     other = page.split("<h2>Checks that were not run</h2>")[1].split("<h2>")[0]
     assert other.count("no data here") == 1
@@ -132,6 +139,17 @@ def test_it_goes_on_after_an_interruption_and_runs_nothing_twice(tmp_path):
     assert [row["link"] for row in index["rows"]] == ["one/report.html", "two/report.html"]
     assert index["summary"] == {"pass": 0, "fail": 1, "not run": 1}
     assert 'href="one/report.html"' in (tmp_path / "index.html").read_text()
+
+
+def test_another_package_goes_on_with_nothing(tmp_path, monkeypatch):
+    calls = []
+    case = run_of(RECORD, [Check("a b", 0.1, 0.84, "K")], calls)
+    reproduce_everything([case], tmp_path, seed=0, key="k")
+    monkeypatch.setattr(everything, "package_digest", lambda: "another")
+    with pytest.raises(OutputExistsError):
+        reproduce_everything([case], tmp_path, seed=0, key="k")
+    reproduce_everything([case], tmp_path, seed=0, key="k", force=True)
+    assert calls == ["one", "one"]
 
 
 def test_the_index_of_other_work_is_not_replaced(tmp_path, capsys):

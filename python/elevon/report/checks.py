@@ -28,6 +28,8 @@ class Check(Plain):
         Whether `limit` is the smallest allowed value instead of the largest.
     ours : float, optional
         What the work itself found, where `value` is its distance from a printed number.
+    ours_unit : str, optional
+        Its unit, where that is not `unit`.
     """
 
     COMPUTED = ("passed",)
@@ -38,6 +40,7 @@ class Check(Plain):
     unit: str = ""
     at_least: bool = False
     ours: float | None = None
+    ours_unit: str | None = None
 
     @property
     def passed(self) -> bool:

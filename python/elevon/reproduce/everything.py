@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +21,7 @@ from elevon.worklog import Item, finished, sweep
 
 PASS, FAIL, NOT_RUN = "pass", "fail", "not run"
 _INDEX = ("index.html", "index.json")
+UNEXPLAINED = "no reason is known"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,8 @@ class IndexRow:
         The command; the check's name.
     ours : float or None
         The number found; None where the case was not run.
+    unit : str
+        Its unit; empty for a plain number.
     theirs : str
         What is printed, with its unit; empty where nothing is.
     value : float or None
@@ -53,6 +59,7 @@ class IndexRow:
     case: str
     check: str
     ours: float | None
+    unit: str
     theirs: str
     value: float | None
     limit: str
@@ -83,11 +90,12 @@ class CaseRun:
 
 @dataclass(frozen=True, slots=True)
 class EveryCase:
-    """Rows of every published case."""
+    """Rows of every published case; processor time [s] of each that ran."""
 
     rows: tuple[IndexRow, ...]
     checks: tuple[Check, ...]
     seed: int
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
@@ -107,6 +115,7 @@ class EveryCase:
             "checks": [check.to_dict() for check in self.checks],
             "summary": {verdict: self.count(verdict) for verdict in (PASS, FAIL, NOT_RUN)},
             "rows": [asdict(row) for row in self.rows],
+            "cpu_s": dict(self.seconds),
             "seed": self.seed,
             "version": elevon.__version__,
         }
@@ -133,7 +142,8 @@ def reproduce_everything(
     seed : int
         As the cases were given it.
     key : str
-        Tells this work from any other: a folder of other work is not gone on with.
+        Tells this work from any other: a folder of other work is not gone on with, nor is one of
+        another package (`package_digest`).
     force : bool
         Whether the index of other work may be replaced.
     date : str, optional
@@ -148,11 +158,12 @@ def reproduce_everything(
     BusyError, OutputError
         As `elevon.worklog.finished`.
     """
+    key = f"{key} package {package_digest()}"
     if not _same_work(folder, key):
         for name in _INDEX:
             check_output(folder / name, force=force)
     total = sum(case.record.seconds for case in cases)
-    done, rows, checks = 0.0, [], []
+    done, rows, checks, seconds = 0.0, [], [], {}
     with finished(folder, key) as log:
         assert log is not None
         sweep(folder)
@@ -162,15 +173,30 @@ def reproduce_everything(
             done += case.record.seconds
             rows += more[0]
             checks += more[1]
+            if (item := log.items.get(case.record.name)) is not None:
+                seconds[case.record.name] = item.data["cpu_s"]
             if progress is not None:
                 progress(min(done / total, 1.0))
-        result = EveryCase(tuple(rows), tuple(checks), seed)
+        result = EveryCase(tuple(rows), tuple(checks), seed, seconds)
         text = json.dumps(finite(result.to_dict()), allow_nan=False, indent=1)
         from elevon.reproduce.everything_page import index_page
 
         write_text(folder / "index.json", text + "\n", force=True)
         index_page(result, date).save(folder / "index.html", force=True, links=False)
     return result
+
+
+@cache
+def package_digest() -> str:
+    """Return digits of every file of the package, on any of which an answer may depend."""
+    root = Path(__file__).parents[1]
+    content = hashlib.sha256()
+    for path in sorted(root.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            content.update(path.relative_to(root).as_posix().encode() + b"\0")
+            with path.open("rb") as stream:
+                content.update(hashlib.file_digest(stream, "sha256").digest())
+    return content.hexdigest()[:16]
 
 
 def _same_work(folder: Path, key: str) -> bool:
@@ -192,6 +218,7 @@ def _run(
     item: Item | None = log.intact(record.name)
     if item is None:
         place = folder / record.name
+        begin = time.process_time()
         try:
             values = case.work(place, progress)
         except Interrupted:
@@ -199,20 +226,20 @@ def _run(
         except ElevonError as error:
             return rows_without(record, FAIL, str(error)), []
         files = [path for path in (place / "report.html", place / "rows.csv") if path.is_file()]
-        item = log.note(record.name, files, checks=finite(values["checks"]))
+        spent = round(time.process_time() - begin, 1)
+        item = log.note(record.name, files, checks=finite(values["checks"]), cpu_s=spent)
     checks = [_check(entry) for entry in item.data["checks"]]
     page = f"{record.name}/report.html"
     link = page if page in item.files else ""
-    named = [Check(f"{record.name}: {c.name}", c.value, c.limit, c.unit, c.at_least, c.ours)
-             for c in checks]  # fmt: skip
+    named = [replace(check, name=f"{record.name}: {check.name}") for check in checks]
     return rows_of(record, checks, link), named
 
 
 def _check(entry: Mapping[str, Any]) -> Check:
     """Return a check as it was kept; a value that was not finite is null there."""
     fields = {name: entry[name] for name in ("name", "limit", "unit", "at_least")}
-    value = entry["value"]
-    return Check(value=float("nan") if value is None else value, ours=entry.get("ours"), **fields)
+    value, other = entry["value"], {name: entry.get(name) for name in ("ours", "ours_unit")}
+    return Check(value=float("nan") if value is None else value, **other, **fields)
 
 
 def rows_of(record: Published, checks: Sequence[Check], link: str = "") -> list[IndexRow]:
@@ -237,13 +264,14 @@ def _row(record: Published, check: Check, judged: Judgement, link: str) -> Index
     sign, unit = (">=" if check.at_least else "<="), f" {check.unit}".removesuffix(" 1").rstrip()
     beyond = "below" if check.at_least else "above"
     why = f"{check.value:.5g} is {beyond} {check.limit:.5g}{unit}"
-    reason = "" if check.passed else f"{why}: {judged.known}" if judged.known else why
+    reason = "" if check.passed else f"{why}: {judged.known or UNEXPLAINED}"
     return IndexRow(
         paper=paper,
         item=item,
         case=record.name,
         check=check.name,
         ours=check.value if check.ours is None else check.ours,
+        unit=(check.unit if check.ours_unit is None else check.ours_unit).removesuffix("1"),
         theirs=judged.theirs,
         value=check.value,
         limit=f"{sign} {check.limit:.5g}{unit}",
@@ -258,5 +286,5 @@ def _without(
     record: Published, judged: Judgement, verdict: str, reason: str, link: str
 ) -> IndexRow:
     paper, _, item = judged.item.partition(" ")
-    return IndexRow(paper, item, record.name, judged.check, None, judged.theirs, None, "",
+    return IndexRow(paper, item, record.name, judged.check, None, "", judged.theirs, None, "",
                     verdict, reason, judged.definition, link)  # fmt: skip

@@ -14,7 +14,18 @@ from elevon.reproduce.provenance import provenance
 if TYPE_CHECKING:
     from elevon.reproduce.everything import EveryCase, IndexRow
 
-_COLUMNS = ("item", "case", "check", "ours", "theirs", "value", "limit", "verdict", "definition")
+_COLUMNS = (
+    "item",
+    "case",
+    "check",
+    "ours",
+    "unit",
+    "theirs",
+    "value",
+    "limit",
+    "verdict",
+    "definition",
+)
 
 
 def index_page(result: EveryCase, date: str | None) -> Report:

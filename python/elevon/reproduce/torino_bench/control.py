@@ -57,11 +57,13 @@ class ControlResult(CheckedResult):
         least = REQUIRED["secondary controls that assist them"]
         return [
             Check("root at no gain less the filter's pole", abs(first * TIME / FILTER + 1.0), 1e-9,
-                  "1", ours=first),
-            Check("root at the largest gain, over the pole", last / first, 1e-3, "1", ours=last),
+                  "1", ours=first, ours_unit="1/s"),
+            Check("root at the largest gain, over the pole", last / first, 1e-3, "1", ours=last,
+                  ours_unit="1/s"),
             Check("least step of the root towards zero", float(np.min(np.diff(self.roots))), 0.0,
                   "1/s", at_least=True),
-            Check("no-load speed less the drive's limit", speed, 0.01, "1", ours=self.speed_deg_s),
+            Check("no-load speed less the drive's limit", speed, 0.01, "1", ours=self.speed_deg_s,
+                  ours_unit="deg/s"),
             Check("no-load speed, secondary controls that assist", self.speed_deg_s, least, "deg/s",
                   at_least=True),
         ]  # fmt: skip

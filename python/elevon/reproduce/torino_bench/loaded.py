@@ -92,7 +92,7 @@ class LoadedCampaign(CheckedResult):
                   "N m"),
             Check("torque an ampere balances, less the calibrated constant",
                   abs(self.slope() / self.torque_constant - 1.0), SLOPE_LIMIT, "1",
-                  ours=self.slope()),
+                  ours=self.slope(), ours_unit="N m/A"),
             Check("lost motion of the bench beyond 2 % of the backlash", bench, self.count_deg,
                   "deg"),
             Check("lost motion of the model beyond 2 % of the backlash", model, self.count_deg,
