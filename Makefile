@@ -116,7 +116,9 @@ sdist: $(STAMPS)/packages ## the source distribution in dist/, built once more f
 	git rev-parse --short=12 HEAD > python/elevon/cli/commit.txt
 	$(BIN)/maturin sdist --out dist
 	@rm -f python/elevon/cli/commit.txt
+	@rm -rf dist/from-source
 	$(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist/from-source dist/elevon-*.tar.gz
+	$(BIN)/python tools/check_wheel.py dist/from-source --from-sdist
 
 bench: setup ## the timed comparisons
 	$(BIN)/python -m pytest -q -m bench

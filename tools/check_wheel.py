@@ -1,88 +1,31 @@
-"""Install the newest wheel of a folder where there is no compiler; use it without and with extras.
+"""Install a wheel where there is no compiler; use it without and with extras.
 
-Run by `make wheel`. Needs a package index, as every `pip install` does.
+    python tools/check_wheel.py dist              the newest wheel of a folder
+    python tools/check_wheel.py A.whl --from-sdist    made of the source distribution: no FMU binary
+
+Run by `make wheel` and `make sdist`. Prints the seconds from nothing to the first picture. Needs a
+package index, as every `pip install` does.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
+import re
 import subprocess
 import sys
 import tempfile
+import time
 import venv
 from pathlib import Path
 
 MOST_MB = 130
 # What is part of every environment and not of the installation.
 NOT_OURS = ("pip", "setuptools", "wheel", "_distutils_hack", "pkg_resources")
-
-
-def main(folder: str) -> int:
-    """Check the newest wheel of a folder; return the exit code."""
-    wheel = max(Path(folder).resolve().glob("elevon-*.whl"), key=lambda path: path.stat().st_mtime)
-    with tempfile.TemporaryDirectory() as temporary:
-        home = Path(temporary)
-        venv.create(home / "env", with_pip=True)
-        scripts = home / "env" / ("Scripts" if os.name == "nt" else "bin")
-        # Nothing of the caller's: no cargo, no compiler, no package beside it.
-        keep = {
-            "HOME",
-            "SYSTEMROOT",
-            "TEMP",
-            "TMP",
-            "LANG",
-            "PIP_INDEX_URL",
-            "PIP_CERT",
-            "SSL_CERT_FILE",
-        }
-        environment = {key: value for key, value in os.environ.items() if key in keep}
-        environment["PATH"] = str(scripts)
-
-        def run(*words: str, fails: bool = False) -> str:
-            done = subprocess.run(
-                words, cwd=home, env=environment, capture_output=True, text=True, check=False
-            )
-            if (done.returncode != 0) != fails:
-                raise SystemExit(f"{' '.join(words)}: exit {done.returncode}\n{done.stderr}")
-            return done.stdout + done.stderr
-
-        python, elevon = str(scripts / "python"), str(scripts / "elevon")
-        run(python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", str(wheel))
-        where = run(python, "-c", "import elevon; print(elevon.__path__[0])").strip()
-        size = _megabytes(Path(where).parent)
-        print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MB, installed {size:.0f} MB")
-        if size > MOST_MB:
-            raise SystemExit(f"the installation takes {size:.0f} MB; at most {MOST_MB}")
-        run(elevon, "list", "actuators")
-        run(elevon, "show", "torino-rotary")
-        run(elevon, "simulate", "torino-rotary", "--duration", "0.2", "--out", "run.csv")
-        run(elevon, "export", "fmu", "torino-rotary", "-o", "a.fmu")
-        run(elevon, "bench", "run", "stall", "--actuator", "torino-rotary", "--out", "bench")
-        run(python, "-c", SESSION)
-        output = run(
-            elevon,
-            "simulate",
-            "torino-rotary",
-            "--duration",
-            "0.1",
-            "--out",
-            "run.parquet",
-            fails=True,
-        )
-        if f"elevon[files] @ {wheel.as_uri()}" not in output:
-            raise SystemExit(f"a command without its extra does not name it: {output}")
-        print("simulate, list, show, export, bench, sessions, CSV: without extras and a compiler")
-        everything = f"elevon[all] @ {wheel.as_uri()}"
-        run(python, "-m", "pip", "install", "--quiet", "--only-binary", ":all:", everything)
-        unit = ("--actuator", "torino-rotary")
-        run(elevon, "simulate", "torino-rotary", "--duration", "0.1", "--out", "run.parquet")
-        run(elevon, "simulate", "torino-rotary", "--duration", "0.1", "--plot", "run.html")
-        run(elevon, "bench", "run", "chirp", *unit, "--fidelity", "low", "--out", "logs")
-        run(elevon, "diagnose", "logs/chirp.csv", *unit, "--baseline", "logs/chirp.csv")
-        print("Parquet, pictures, diagnosis: with all extras, without a compiler")
-    return 0
-
-
+# Nothing of the caller's: no cargo, no compiler, no package beside it.
+PASSED_ON = ("HOME", "SYSTEMROOT", "TEMP", "TMP", "LANG", "SSL_CERT_FILE")
+INSTALL = ("-m", "pip", "install", "--quiet", "--only-binary", ":all:")
+TURN = ("simulate", "torino-rotary", "--duration", "0.1")
 SESSION = """
 import elevon
 session = elevon.Session("nasa-ballscrew")
@@ -93,6 +36,84 @@ assert elevon.Recording.load("session.csv").equals(recording)
 """
 
 
+class Place:
+    """A folder with an environment of its own, and the seconds of what it has run."""
+
+    def __init__(self, folder: Path) -> None:
+        began = time.monotonic()
+        self.folder = folder
+        venv.create(folder / "env", with_pip=True)
+        self.scripts = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
+        passed = {k: v for k, v in os.environ.items() if k in PASSED_ON or k.startswith("PIP_")}
+        self.environment = {**passed, "PATH": str(self.scripts)}
+        self.seconds = time.monotonic() - began
+
+    def run(self, name: str, *words: str, fails: bool = False) -> str:
+        """Run a program of the environment; return what it printed."""
+        began = time.monotonic()
+        done = subprocess.run(
+            [str(self.scripts / name), *words], cwd=self.folder, env=self.environment,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        self.seconds += time.monotonic() - began
+        if (done.returncode != 0) != fails:
+            raise SystemExit(f"{name} {' '.join(words)}: exit {done.returncode}\n{done.stderr}")
+        return done.stdout + done.stderr
+
+
+def main(arguments: list[str]) -> int:
+    """Check a wheel; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wheel", nargs="?", type=Path, default=Path("dist"))
+    parser.add_argument("--from-sdist", action="store_true", help="the binary of FMUs is not in it")
+    options = parser.parse_args(arguments)
+    wheel = options.wheel.resolve()
+    if wheel.is_dir():
+        wheel = max(wheel.glob("elevon-*.whl"), key=lambda path: path.stat().st_mtime)
+    if "-cp311-abi3-" not in wheel.name:
+        raise SystemExit(f"{wheel.name}: not for every Python from 3.11 on (cp311-abi3)")
+    with tempfile.TemporaryDirectory() as folder:
+        bare(Place(Path(folder)), wheel, fmus=not options.from_sdist)
+    with tempfile.TemporaryDirectory() as folder:
+        everything(Place(Path(folder)), wheel)
+    return 0
+
+
+def bare(place: Place, wheel: Path, *, fmus: bool) -> None:
+    """What works without extras, and what names the extra that it lacks."""
+    place.run("python", *INSTALL, str(wheel))
+    where = place.run("python", "-c", "import elevon; print(elevon.__path__[0])").strip()
+    size = _megabytes(Path(where).parent)
+    print(f"{wheel.name}: {wheel.stat().st_size / 2**20:.1f} MB, installed {size:.0f} MB")
+    if size > MOST_MB:
+        raise SystemExit(f"the installation takes {size:.0f} MB; at most {MOST_MB}")
+    version = place.run("elevon", "--version").strip()
+    if not re.search(r"\([0-9a-f]{12}\)$", version):
+        raise SystemExit(f"elevon --version prints {version!r}: no commit of twelve digits")
+    place.run("elevon", "list", "actuators")
+    place.run("elevon", "show", "torino-rotary")
+    place.run("elevon", *TURN, "--out", "run.csv")
+    place.run("elevon", "export", "fmu", "torino-rotary", "-o", "a.fmu", fails=not fmus)
+    place.run("elevon", "bench", "run", "stall", "--actuator", "torino-rotary", "--out", "bench")
+    place.run("python", "-c", SESSION)
+    output = place.run("elevon", *TURN, "--out", "run.parquet", fails=True)
+    if f"elevon[files] @ {wheel.as_uri()}" not in output:
+        raise SystemExit(f"a command without its extra does not name it: {output}")
+    print(f"{version}: works without extras and without a compiler")
+
+
+def everything(place: Place, wheel: Path) -> None:
+    """The seconds from nothing to the first picture; what the extras are for."""
+    place.run("python", *INSTALL, f"elevon[all] @ {wheel.as_uri()}")
+    place.run("elevon", *TURN, "--plot", "run.html")
+    print(f"from nothing to the first picture: {place.seconds:.0f} s")
+    unit = ("--actuator", "torino-rotary")
+    place.run("elevon", *TURN, "--out", "run.parquet")
+    place.run("elevon", "bench", "run", "chirp", *unit, "--fidelity", "low", "--out", "logs")
+    place.run("elevon", "diagnose", "logs/chirp.csv", *unit, "--baseline", "logs/chirp.csv")
+    print("Parquet, pictures, diagnosis: with all extras, without a compiler")
+
+
 def _megabytes(packages: Path) -> float:
     files = (path for path in packages.rglob("*") if path.is_file() and not path.is_symlink())
     ours = (f for f in files if not f.relative_to(packages).parts[0].startswith(NOT_OURS))
@@ -100,4 +121,4 @@ def _megabytes(packages: Path) -> float:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else "dist"))
+    sys.exit(main(sys.argv[1:]))

@@ -19,9 +19,9 @@ Made by a command, not by hand:
     {command} --table FILE
 
 Least severity of each fault that moves a test's numbers by three deviations of a healthy unit with
-one healthy log of another day as baseline (how: [faults.md](faults.md#detection-limits)). `-`: no
-severity does in this test; why stands below each table. A fault that is there or not has the limit
-0.5. Logs of the {fidelity} model, seed {seed}.
+one healthy log of another day as baseline ([how](../reference/faults.md#detection-limits)). `-`:
+no severity does in this test. Why stands below each table. A fault that is there or not has the
+limit 0.5. Logs of the {fidelity} model, seed {seed}.
 """
 
 

@@ -16,9 +16,9 @@ Turning servos of a bench written apart from the package (`tests/calibrate/forei
 friction laws (Coulomb, bristles), a sampled speed controller, a current loop with a lag, rigid or
 elastic backlash, gear errors drawn anew in each run, windings that warm up, logs of 400 Hz and 1
 kHz. Each unit is calibrated on a log of each of three tests; all other logs are of other days.
-Intervals are of 95 %. Alarms are `faulty` and `unknown_fault`; gated is `model_does_not_fit`. A
-cause moves the log where one feature lies beyond five deviations of the unit's healthy days;
-unknown is `unknown_fault`, `model_does_not_fit`, a refused log, or `p_other` of one half and
+Intervals are of 95 %. Alarms are `faulty` and `unknown_fault`. Gated is `model_does_not_fit`. A
+cause moves the log where one feature lies beyond five deviations of the unit's healthy days.
+Unknown is `unknown_fault`, `model_does_not_fit`, a refused log, or `p_other` of one half and
 more. `spread learnt`: by `learn-spread` on {learned} other days of each test of the same unit. The
 screw's and the gear's logs are the package's own switching model's, so that part is no
 independent judgement.
