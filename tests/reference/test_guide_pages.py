@@ -28,6 +28,12 @@ def test_sentences_are_short(path):
     assert measured(path.read_text("utf-8")).pace < MOST_WORDS
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "docs/explanation/theory").glob("*.md")), ids=str)
+def test_a_theory_page_names_its_sources(path):
+    """As links, which `test_links_and_pictures_are_there` follows."""
+    assert re.search(r"\]\((\.\./)+crates/elevon-core/src/\S+\.rs\)", path.read_text("utf-8"))
+
+
 HOW_TO = [path for path in guide_pages() if path.parent.name == "how-to" and path.stem != "index"]
 
 
