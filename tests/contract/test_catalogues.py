@@ -65,6 +65,7 @@ def test_every_fault_is_described(wiring: str) -> None:
         assert record["rate_source"].startswith(("T3 Table 1.1", "ASSUMED")), record["kind"]
         assert record["minimum"] <= 0.0 <= record["maximum"], record["kind"]
         assert record["minimum"] < record["maximum"], record["kind"]
+        assert record["switched"] == record["effect"].startswith("1: "), record["kind"]
         unique([a["name"] for a in record["attributes"]])
         assert record["fidelities"], record["kind"]
 

@@ -188,6 +188,7 @@ pub fn faults<'py>(py: Python<'py>, wiring: &str) -> Dicts<'py> {
             }
             d.set_item("targets", targets)?;
             d.set_item("whole", f.counted())?;
+            d.set_item("switched", f.switched())?;
             carried(d, |fidelity| f.not_modelled(model.groups(), fidelity))
         })
     })

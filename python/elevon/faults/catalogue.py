@@ -107,7 +107,7 @@ def catalogue(wiring: str) -> tuple[FaultRecord, ...]:
             not_modelled=item["not_modelled"],
             targets={place: tuple(paths) for place, paths in item["targets"].items()},
             whole=bool(item["whole"]),
-            switched=item["effect"].startswith("1: "),
+            switched=bool(item["switched"]),
         )
         for item in _core.faults(wiring)
     )

@@ -72,7 +72,16 @@ pub struct FaultKind {
 impl FaultKind {
     /// Is the severity a count?
     pub fn counted(&self) -> bool {
-        self.places.iter().flat_map(|p| p.targets).any(|t| t.op == Op::AddWhole)
+        self.moves_by(Op::AddWhole)
+    }
+
+    /// Is it a switch: not there below half the severity, whole from there on?
+    pub fn switched(&self) -> bool {
+        self.moves_by(Op::Set)
+    }
+
+    fn moves_by(&self, op: Op) -> bool {
+        self.places.iter().flat_map(|p| p.targets).any(|t| t.op == op)
     }
 
     /// Why a fidelity of an actuator of these parameters does not carry the fault, if so: it acts where the parameters act
