@@ -170,6 +170,13 @@ pub trait Scalar:
 /// 1.5 * 2^52: adding it rounds to an integer, which then stands in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
+/// Runs a kernel as a function of its own, with the instructions that the build assumes. In its callers the forms of a step
+/// would make one function, which takes far longer to compile than its parts.
+#[inline(never)]
+fn plainly<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run()
+}
+
 /// Runs a kernel as a function of its own, with its instruction set: for large code that is wanted in several places.
 #[inline(never)]
 pub(crate) fn apart<S: Scalar, K: Kernel>(kernel: K) -> K::Output {

@@ -98,6 +98,6 @@ impl Scalar for f64 {
         // SAFETY: the features were just detected.
         return unsafe { super::x86::with_avx2(kernel) };
         #[cfg(not(target_arch = "x86_64"))]
-        kernel.run()
+        super::plainly(kernel)
     }
 }

@@ -12,7 +12,7 @@ use crate::scalar::{Dual, Scalar};
 
 /// Slopes on a processor without the vectors below.
 #[cfg(not(any(feature = "physics", feature = "widest")))]
-type Slopes = crate::scalar::Portable<2>;
+type Slopes = crate::scalar::Portable;
 #[cfg(any(feature = "physics", feature = "widest"))]
 type Slopes = f64;
 

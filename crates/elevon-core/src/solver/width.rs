@@ -90,7 +90,7 @@ macro_rules! with_lanes {
         match $width {
             #[cfg(not(any(feature = "physics", feature = "widest")))]
             $crate::solver::Width::Portable => {
-                type $lanes = $crate::scalar::Portable<2>;
+                type $lanes = $crate::scalar::Portable;
                 $body
             }
             #[cfg(all(target_arch = "x86_64", not(any(feature = "physics", feature = "widest"))))]

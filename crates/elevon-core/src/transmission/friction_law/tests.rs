@@ -277,13 +277,17 @@ fn any_stiffness_runs_at_any_step() {
 /// A lane among others has the bits of a run alone, whatever its neighbours do.
 #[test]
 fn lanes_have_the_bits_of_single_runs() {
+    lanes_are_single_runs(0, [0.0, -3.7]);
+    lanes_are_single_runs(2, [1e-9, 250.0]);
+}
+
+fn lanes_are_single_runs(first: usize, speeds: [f64; 2]) {
     use crate::scalar::{Portable, Scalar};
-    type Lanes = Portable<4>;
-    let speeds = [0.0, -3.7, 1e-9, 250.0];
+    type Lanes = Portable;
     let each = |i: usize, p: P| match p {
-        P::StribeckExponent => 1.0 + 0.35 * i as f64,
-        P::BristleStiffness => 100.0 * 30.0_f64.powi(i as i32),
-        p => FRICTION_LAW[p as usize].default.unwrap_or(0.0) * (1.0 + 0.1 * i as f64),
+        P::StribeckExponent => 1.0 + 0.35 * (first + i) as f64,
+        P::BristleStiffness => 100.0 * 30.0_f64.powi((first + i) as i32),
+        p => FRICTION_LAW[p as usize].default.unwrap_or(0.0) * (1.0 + 0.1 * (first + i) as f64),
     };
     let all = [
         P::Law,
