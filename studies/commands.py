@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -11,12 +12,13 @@ from elevon.cli.groups import NamingGroup
 from elevon.cli.output import answer, say
 from elevon.cli.reproduce.case import (
     Options,
-    PublishedCase,
     Values,
     add_command,
     check_file,
     print_columns,
+    read_cases,
 )
+from elevon.cli.tables import read_table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,45 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "fault_limits", "fault_limits_page", "independent"]
 
-_LOGGED = Annotated[int, typer.Option("--runs", min=1, help="Units of the bench, 95 logs each.")]
-_WATCHED = Annotated[int, typer.Option("--units", min=1, help="Benches, 39 streams each.")]
-_FOREIGN = Annotated[int, typer.Option("--units", min=1, help="Units of the foreign bench.")]
-_HEALTHY = Annotated[int, typer.Option("--healthy", min=4, help="Healthy logs of each test.")]
-_SWITCHING = Annotated[
-    int, typer.Option("--switching", min=0, help="Healthy logs of the screw and of the gear.")
-]
-_LEARNT = Annotated[
-    int, typer.Option("--learned", min=0, help="Days of each test that a spread is learnt from.")
-]
-_INSPECTED = Annotated[int, typer.Option("--units", min=2, help="Benches, 40 inspections each.")]
-_PAIRED = Annotated[int, typer.Option("--units", min=2, help="Units of every pair.")]
-_FOLDER = Annotated[
-    Path | None,
-    typer.Option("--runs", metavar="DIR", help="Keeps what is finished, and goes on from there."),
-]
-_SEEDS = Annotated[int, typer.Option("--seeds", min=2, help="Logs of every fault.")]
-_BUDGET = Annotated[int, typer.Option("--budget", min=40, help="Model runs of a search.")]
-_PROCESSES = Annotated[
-    int | None, typer.Option("--processes", min=1, help="Side by side; default: all processors.")
-]
-_HISTORIES = Annotated[int, typer.Option("--histories", min=3, help="Lives, over three faults.")]
-_LIVES = Annotated[int, typer.Option("--lives", min=1, help="Lives of each form and fault.")]
-_SPECIMENS = Annotated[int, typer.Option("--specimens", min=0, help="Virkler's cracks.")]
-_MEASURED = Annotated[
-    bool, typer.Option("--measured", help="Inspections measure the requirements, too.")
-]
-_ACTUATORS = Annotated[
-    list[str] | None,
-    typer.Option("--actuator", help="Set; repeatable. Default: one of each wiring."),
-]
-_DAYS = Annotated[int, typer.Option("--days", min=1, help="Healthy logs of each test.")]
-_INJECTED = Annotated[
-    int, typer.Option("--injected", min=0, help="Faults of each test that a log checks.")
-]
-_FIDELITY = Annotated[str, typer.Option("--fidelity", help="Of the logs: high or low.")]
-_TABLE = Annotated[
-    Path | None, typer.Option("--table", help="Markdown file for the limits of all tests.")
-]
 _LIMITS = ("actuator", "test", "kind", "place", "limit", "unit", "injected", "alarm", "named")
 
 
@@ -200,131 +163,19 @@ def _show_lives(values: Values, result: Any) -> None:
     answer(f"{result.seconds:.0f} s; one update with its prediction {values['longest_s']:.2g} s")
 
 
-_STUDIES = (
-    PublishedCase(
-        "diagnosis-limits",
-        "Diagnose logs of benches that are unlike the model: false alarms, isolation, severity.",
-        "making and diagnosing logs",
-        "studies.diagnosis_limits.result:study_diagnosis_limits",
-        ("group", "test", "fault", "severity", "logs", "detected", "isolated", "interval",
-         "error_median", "coverage"),
-        page="studies.diagnosis_limits.page:limits_report",
-        options={"runs": (_LOGGED, 8)},
-        names={"folder": "out", "units": "runs"},
-    ),
-    PublishedCase(
-        "independent",
-        "Diagnose logs of another program: false alarms, unknown causes, single faults.",
-        "making and diagnosing logs",
-        "studies.commands:independent",
-        ("what", "hits", "logs", "share", "interval"),
-        page="studies.independent.page:independent_report",
-        options={
-            "units": (_FOREIGN, 4),
-            "healthy": (_HEALTHY, 17),
-            "switching": (_SWITCHING, 60),
-            "learned": (_LEARNT, 7),
-            "processes": (_PROCESSES, None),
-            "runs": (_FOLDER, None),
-            "table": (_TABLE, None),
-        },
-        names={"folder": "runs"},
-        prepare=lambda options: check_file(options["table"], options),
-        finish=_save_independent,
-    ),
-    PublishedCase(
-        "monitor-delay",
-        "Watch streams in which a fault begins: delay against severity, and false alarms.",
-        "making and watching streams",
-        "studies.monitor_delay:study_monitor_delay",
-        ("fault", "severity", "streams", "alarms", "before_onset", "delay_median",
-         "delay_largest", "named"),
-        "streams in which a fault begins",
-        options={"units": (_WATCHED, 3)},
-        show=_show_watched,
-    ),
-    PublishedCase(
-        "inspection-error",
-        "Inspect units by three logs each: the errors of backlash, friction and short.",
-        "making and diagnosing inspections",
-        "studies.inspection_error.result:study_inspection_error",
-        ("fault", "relative", "absolute", "common_relative", "common_absolute",
-         "stated_relative", "stated_absolute", "stated_over_scatter", "coverage"),
-        "deviations, and what intervals state",
-        options={"units": (_INSPECTED, 6), "runs": (_FOLDER, None)},
-        names={"folder": "runs"},
-        show=_show_inspected,
-    ),
-    PublishedCase(
-        "fault-limits",
-        "Detection limit of each fault in each standard test of each actuator.",
-        "running and diagnosing the standard tests",
-        "studies.commands:fault_limits",
-        _LIMITS,
-        page="studies.commands:fault_limits_page",
-        options={
-            "actuator": (_ACTUATORS, None),
-            "days": (_DAYS, 10),
-            "injected": (_INJECTED, 12),
-            "fidelity": (_FIDELITY, "low"),
-            "table": (_TABLE, None),
-        },
-        prepare=lambda options: check_file(options["table"], options),
-        finish=_save_table,
-    ),
-    PublishedCase(
-        "next-test",
-        "Choose tests by expected information on ambiguous pairs; count them and a fixed order's.",
-        "testing units",
-        "studies.next_test:study_next_test",
-        ("pair", "strategy", "units", "tests", "tests_interval", "certain", "right"),
-        "tests until one condition has 95 %",
-        options={"units": (_PAIRED, 24)},
-        show=_show_saved,
-    ),
-    PublishedCase(
-        "diagnosis-optimisers",
-        "Diagnose by genetic algorithm, differential evolution, swarm, grey wolves, and by ours.",
-        "searching",
-        "studies.optimisers.study:study_optimisers",
-        ("method", "fault", "logs", "error_percent_of_range", "error_interval",
-         "evaluations", "seconds", "reached_our_error"),
-        "severity error, model runs, processor time",
-        options={
-            "seeds": (_SEEDS, 4),
-            "budget": (_BUDGET, 2000),
-            "processes": (_PROCESSES, None),
-            "runs": (_FOLDER, None),
-        },
-        names={"folder": "runs"},
-    ),
-    PublishedCase(
-        "prognosis",
-        "Predict the ends of units on the switching model, under laws unlike the filter's.",
-        "run-to-failure histories",
-        "studies.prognosis:study_prognosis",
-        page="studies.prognosis.page:prognosis_report",
-        options={
-            "histories": (_HISTORIES, 60),
-            "processes": (_PROCESSES, None),
-            "measured": (_MEASURED, False),
-        },
-        show=_show_lives,
-    ),
-    PublishedCase(
-        "foreign",
-        "Predict lives whose growth no law describes, beside methods without a law.",
-        "foreign growth",
-        "studies.foreign:study_foreign",
-        page="studies.foreign.page:foreign_report",
-        options={
-            "lives": (_LIVES, 7),
-            "specimens": (_SPECIMENS, 68),
-            "processes": (_PROCESSES, None),
-        },
-        show=_show_foreign,
-    ),
-)  # fmt: skip
+def _check_table(options: Options) -> None:
+    check_file(options["table"], options)
+
+
+_STEPS: Mapping[str, Mapping[str, Callable[..., None]]] = {
+    "independent": {"prepare": _check_table, "finish": _save_independent},
+    "monitor-delay": {"show": _show_watched},
+    "inspection-error": {"show": _show_inspected},
+    "fault-limits": {"prepare": _check_table, "finish": _save_table},
+    "next-test": {"show": _show_saved},
+    "prognosis": {"show": _show_lives},
+    "foreign": {"show": _show_foreign},
+}
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -341,5 +192,5 @@ def _group() -> None:
     """Judge Elevon's own diagnosis and prognosis; exit code 1 when a check fails."""
 
 
-for _study in _STUDIES:
+for _study in read_cases(read_table("commands.toml", "studies"), _STEPS):
     add_command(app, _study)

@@ -2,6 +2,8 @@
 
 import re
 import shlex
+from importlib import import_module
+from inspect import signature
 
 import pytest
 import typer
@@ -10,6 +12,7 @@ from elevon.cli import main
 from elevon.cli.help import example_of, help_rows
 from elevon.cli.output import progress_bar
 from elevon.cli.registry import COMMANDS
+from elevon.cli.tables import read_table
 from tests.harness.registry import commands
 
 FOUND = {name: command for name, command in commands() if not name.startswith("studies")}
@@ -83,3 +86,17 @@ def test_progress_ends_at_the_whole_and_not_where_work_stopped(capsys):
     with pytest.raises(StopError):
         stopped()
     assert capsys.readouterr().err.splitlines() == ["work: 40 %"]
+
+
+def test_each_text_of_an_option_belongs_to_a_parameter():
+    homes = {"all_cases": "elevon.cli.reproduce.all_cases"}
+    texts = read_table("options.toml")
+    for name in texts.keys() - {"arguments", "options", "case"}:
+        module = import_module(homes.get(name, f"elevon.cli.{name}"))
+        own = [f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__]
+        taken = {function.__name__: {*signature(function).parameters} for function in own}
+        for entry, words in texts[name].items():
+            if "help" in words:
+                assert any(entry in parameters for parameters in taken.values()), (name, entry)
+            else:
+                assert words.keys() <= taken[entry], (name, entry)

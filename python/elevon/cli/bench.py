@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from elevon.cli import common, completion, interrupt
-from elevon.cli.groups import NamingGroup
+from elevon.cli import common, interrupt
+from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar
 from elevon.cli.shell import Answer, command
 
@@ -16,17 +14,7 @@ if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
     from elevon.bench.run import BenchResult
 
-app = typer.Typer(
-    no_args_is_help=True,
-    cls=NamingGroup,
-    rich_markup_mode=None,
-    help="Run the virtual test bench's procedures.",
-)
-
-
-@app.callback()
-def _bench() -> None:
-    """Run the virtual test bench's procedures."""
+app = group("Run the virtual test bench's procedures.")
 
 
 @command(app, name="list")
@@ -48,27 +36,18 @@ def list_procedures() -> Answer:
 
 @command(app, "strict")
 def run(
-    procedure: Annotated[
-        str,
-        typer.Argument(
-            metavar="PROCEDURE",
-            help="A name (elevon bench list) or a TOML file.",
-            autocompletion=completion.procedures,
-        ),
-    ],
+    procedure: str,
     *,
-    actuator: common.ActuatorOption,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the logs.")],
-    fault: common.FaultOption = None,
-    settings: common.SetOption = None,
-    seed: common.SeedOption = 0,
-    fidelity: common.FidelityOption = "high",
-    current: Annotated[str, typer.Option(help="Convention of the currents: rms or peak.")] = "rms",
-    shaft: Annotated[str, typer.Option(help="Shaft of the encoder column: fast or slow.")] = "fast",
-    truth: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the hidden values (JSON).")
-    ] = None,
-    force: common.ForceOption = False,
+    actuator: str,
+    out: Path,
+    fault: list[str] | None = None,
+    settings: list[str] | None = None,
+    seed: int = 0,
+    fidelity: str = "high",
+    current: str = "rms",
+    shaft: str = "fast",
+    truth: Path | None = None,
+    force: bool = False,
 ) -> Answer:
     """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
     from elevon.bench.procedure import load_procedure

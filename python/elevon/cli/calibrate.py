@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -18,40 +18,22 @@ if TYPE_CHECKING:
 
 app = typer.Typer(rich_markup_mode=None)
 
-FreeOption = Annotated[
-    list[str] | None,
-    typer.Option(help="Parameter path to estimate, repeatable; or auto (the default)."),
-]
-PerLogOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--per-log", metavar="PATH", help="Estimated for each log too: backlash.total; repeatable."
-    ),
-]
-RunsFidelityOption = Annotated[
-    str | None,
-    typer.Option(
-        "--fidelity",
-        help="Of the model runs: low or high. Default: low; landing gear: what its logs bear.",
-    ),
-]
-
 
 @command(app, "strict", "details", "report", "date")
 def calibrate(
-    logs: common.LogsArgument,
+    logs: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    out: Annotated[Path | None, typer.Option(help="Set to write (TOML).")] = None,
-    loadcell: common.LoadcellOption = None,
-    command: common.CommandOption = None,
-    column_map: common.MapOption = None,
-    free: FreeOption = None,
-    per_log: PerLogOption = None,
-    fidelity: RunsFidelityOption = None,
-    transient: common.TransientOption = None,
-    settings: common.SetOption = None,
-    force: common.ForceOption = False,
+    actuator: str,
+    out: Path | None = None,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    column_map: Path | None = None,
+    free: list[str] | None = None,
+    per_log: list[str] | None = None,
+    fidelity: str | None = None,
+    transient: float | None = None,
+    settings: list[str] | None = None,
+    force: bool = False,
 ) -> Answer:
     """Estimate what the logs determine, with intervals, and write it as a set."""
     from elevon.calibrate.door import calibrate as run

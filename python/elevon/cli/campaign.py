@@ -4,39 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from elevon.cli import campaign_analysis, interrupt
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 
-app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
+app = group("Run plans of many labelled simulations.")
 campaign_analysis.add_to(app)
-
-PlanArgument = Annotated[Path, typer.Argument(metavar="PLAN", help="The plan file (TOML).")]
-FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
-OutsideOption = Annotated[
-    bool,
-    typer.Option("--allow-outside", help="Let the plan read files outside its folder."),
-]
-ThreadsOption = Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")]
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Of a Dask scheduler.")
-]
-ClusterOption = Annotated[
-    str | None, typer.Option("--cluster", metavar="local:N", help="N Dask workers started here.")
-]
 
 
 @command(app)
 def plan(
-    plan: PlanArgument,
+    plan: Path,
     *,
-    threads: ThreadsOption = None,
-    allow_outside: OutsideOption = False,
+    threads: int | None = None,
+    allow_outside: bool = False,
 ) -> Answer:
     """Check a plan and say what it will take; nothing is written."""
     from elevon.campaign import load_plan, resolve_plan
@@ -98,15 +84,13 @@ def _design_lines(design: dict[str, Any]) -> Iterator[str]:
 
 @command(app, "strict")
 def run(
-    plan: PlanArgument,
+    plan: Path,
     *,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder of the results; resumed if begun.")
-    ],
-    threads: ThreadsOption = None,
-    scheduler: SchedulerOption = None,
-    cluster: ClusterOption = None,
-    allow_outside: OutsideOption = False,
+    out: Path,
+    threads: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
+    allow_outside: bool = False,
 ) -> Answer:
     """Run a plan into a folder; an interrupted one goes on where it was."""
     from elevon.campaign import load_plan, resolve_plan, run_campaign
@@ -128,11 +112,11 @@ def run(
 
 @command(app)
 def resume(
-    folder: FolderArgument,
+    folder: Path,
     *,
-    threads: ThreadsOption = None,
-    scheduler: SchedulerOption = None,
-    cluster: ClusterOption = None,
+    threads: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
 ) -> Answer:
     """Go on with a campaign from its folder; the plan file is not needed."""
     from elevon.campaign import resume_campaign
@@ -149,7 +133,7 @@ def resume(
 
 
 @command(app)
-def status(folder: FolderArgument) -> Answer:
+def status(folder: Path) -> Answer:
     """Say how far a campaign is."""
     state = _status(folder)
     line = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -13,11 +13,6 @@ from elevon.cli.shell import Answer, command
 if TYPE_CHECKING:
     from elevon.analysis.effects import Effects
 
-FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
-ResponseOption = Annotated[
-    str, typer.Option("--response", metavar="R", help="A feature, or a number of runs.parquet.")
-]
-
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands to ``elevon campaign``."""
@@ -26,10 +21,10 @@ def add_to(app: typer.Typer) -> None:
 
 
 def effects(
-    folder: FolderArgument,
+    folder: Path,
     *,
-    response: ResponseOption,
-    level: Annotated[float, typer.Option(help="Confidence of the intervals.")] = 0.95,
+    response: str,
+    level: float = 0.95,
 ) -> Answer:
     """Say which factors move a response, and by how much: main effects and interactions."""
     from elevon.doors import effects as run
@@ -64,20 +59,14 @@ def _interval(term: Any) -> str:
 
 
 def surrogate(
-    folder: FolderArgument,
+    folder: Path,
     *,
-    response: ResponseOption,
-    low: Annotated[
-        Path | None,
-        typer.Option("--low", metavar="DIR", help="The same plan at low fidelity: co-kriging."),
-    ] = None,
-    cost_ratio: Annotated[
-        float | None,
-        typer.Option(min=1.0, help="Cost of a high run over a low one; default: as estimated."),
-    ] = None,
-    budget: Annotated[int | None, typer.Option(min=1, help="Cost in high runs.")] = None,
-    splits: Annotated[int, typer.Option(min=2, help="Random splits.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, help="Of the splits.")] = 0,
+    response: str,
+    low: Path | None = None,
+    cost_ratio: float | None = None,
+    budget: int | None = None,
+    splits: int = 10,
+    seed: int = 0,
 ) -> Answer:
     """Fit a surrogate of a response, and say how well it predicts runs it has not seen.
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from elevon.cli import completion
 from elevon.cli.output import answer, print_table
 from elevon.cli.shell import Answer, command
 
@@ -19,15 +18,9 @@ _SEVERITIES = ("error", "warning", "note")
 
 @command(app)
 def check(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Parameter set or scenario (TOML).")],
+    file: Path,
     *,
-    actuator: Annotated[
-        str | None,
-        typer.Option(
-            help="A scenario's actuator: its signals, faults and parameters are checked, too.",
-            autocompletion=completion.actuators,
-        ),
-    ] = None,
+    actuator: str | None = None,
 ) -> Answer:
     """Report every finding of an actuator file or a scenario file; nothing is simulated."""
     from elevon.documents import read_toml

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from elevon.cli import completion
-from elevon.cli.output import say, show_details
-from elevon.errors import ElevonWarning, InputError
+from elevon.cli.output import say
+from elevon.errors import InputError
 from elevon.files import check_output
 
 if TYPE_CHECKING:
@@ -19,141 +15,6 @@ if TYPE_CHECKING:
     from elevon.logs.log import Log
     from elevon.parameters import Parameter
     from elevon.scenario import Scenario
-
-
-def _strict(value: bool) -> bool:
-    """Turn Elevon's warnings into errors for the rest of this command."""
-    if value:
-        warnings.simplefilter("error", ElevonWarning)
-    return value
-
-
-ActuatorArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="ACTUATOR",
-        help="Name of an actuator file (elevon list actuators) or a file.",
-        autocompletion=completion.actuators,
-    ),
-]
-ActuatorOption = Annotated[
-    str,
-    typer.Option(
-        "--actuator",
-        metavar="ACTUATOR",
-        help="Name of an actuator file, or a file.",
-        autocompletion=completion.actuators,
-    ),
-]
-ScenarioOption = Annotated[
-    Path | None, typer.Option("--scenario", metavar="FILE", help="Scenario file (TOML).")
-]
-DurationOption = Annotated[
-    str | None,
-    typer.Option(help="Simulated time, such as 5 or '200 ms'; overrides the scenario's."),
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="PATH=VALUE[unit]",
-        help="Change a parameter; repeatable.",
-        autocompletion=completion.parameters,
-    ),
-]
-FaultOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fault",
-        metavar="SPEC",
-        help="'KIND@PLACE=VALUE[unit]...'; repeatable.",
-        autocompletion=completion.faults,
-    ),
-]
-FidelityOption = Annotated[
-    str, typer.Option(help="high or low.", autocompletion=completion.fidelities)
-]
-OnlyFidelityOption = Annotated[
-    str | None,
-    typer.Option(
-        "--fidelity",
-        help="Only what acts at this fidelity: high or low.",
-        autocompletion=completion.fidelities,
-    ),
-]
-NotModelledOption = Annotated[
-    bool,
-    typer.Option(
-        "--not-modelled", help="Only what a fidelity (--fidelity: this one) does not carry."
-    ),
-]
-RecordOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--record",
-        metavar="SIGNALS@RATE",
-        help="Such as 'output_position,motor_speed@400 Hz' or 'current_a@every'; repeatable.",
-        autocompletion=completion.signals,
-    ),
-]
-SeedOption = Annotated[int, typer.Option(min=0, help="Seed of the random numbers.")]
-ForceOption = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
-StrictOption = Annotated[
-    bool,
-    typer.Option(
-        "--strict",
-        callback=_strict,
-        help="What is set where it cannot act, and every other warning, is an error.",
-    ),
-]
-DetailsOption = Annotated[
-    bool,
-    typer.Option("--details", callback=show_details, help="Long lists of the answer whole."),
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
-
-OptionalActuatorArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="ACTUATOR", help="Only what this actuator has.", autocompletion=completion.actuators
-    ),
-]
-HistoryArgument = Annotated[
-    Path,
-    typer.Argument(metavar="HISTORY", help="Folder of inspections: diagnoses or logs (JSON)."),
-]
-HistoriesArgument = Annotated[
-    list[Path], typer.Argument(metavar="HISTORY", help="One folder of inspections a unit.")
-]
-MissionOption = Annotated[
-    Path, typer.Option("--mission", metavar="FILE", help="What the unit does and must hold (TOML).")
-]
-
-LogsArgument = Annotated[list[Path], typer.Argument(metavar="LOG", help="Drive logs.")]
-LoadcellOption = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--loadcell",
-        help="Load-cell file; one for each log in order. By default NAME_loadcell.csv beside it.",
-    ),
-]
-CommandOption = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--command",
-        help="Command note; one for each log, or one for all. By default NAME_command.json.",
-    ),
-]
-BaselineOption = Annotated[
-    list[Path] | None,
-    typer.Option("--baseline", metavar="LOG", help="Log of the healthy unit; repeatable."),
-]
-MapOption = Annotated[Path | None, typer.Option("--map", help="Column map (TOML).")]
-TransientOption = Annotated[
-    float | None, typer.Option(min=0.0, help="Left out at the beginning of each log [s].")
-]
-ReportOption = Annotated[Path | None, typer.Option("--report", help="HTML page to write.")]
-DateOption = Annotated[str | None, typer.Option(help="Date printed in the report.")]
 
 
 def read_settings(settings: Sequence[str] | None) -> dict[str, str]:

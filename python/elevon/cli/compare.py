@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -20,29 +20,20 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict")
 def compare(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    scenario: common.ScenarioOption = None,
-    settings: common.SetOption = None,
-    fault: common.FaultOption = None,
-    after: Annotated[
-        float | None, typer.Option(min=0.0, help="Left out before [s]; default as the set says.")
-    ] = None,
-    cutoff: Annotated[float, typer.Option(help="Cut-off of the one filter [Hz].")] = 10.0,
-    loads: Annotated[
-        bool, typer.Option("--loads", help="Repeat it under opposing and aiding load.")
-    ] = False,
-    load: Annotated[
-        str | None,
-        typer.Option(help="Size of that load, such as '500 N'; default the actuator file's."),
-    ] = None,
-    faults_table: Annotated[
-        bool, typer.Option("--faults-table", help="What each fault changes in either model.")
-    ] = False,
-    seed: common.SeedOption = 0,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for report.html.")] = None,
-    force: common.ForceOption = False,
-    date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
+    scenario: Path | None = None,
+    settings: list[str] | None = None,
+    fault: list[str] | None = None,
+    after: float | None = None,
+    cutoff: float = 10.0,
+    loads: bool = False,
+    load: str | None = None,
+    faults_table: bool = False,
+    seed: int = 0,
+    out: Path | None = None,
+    force: bool = False,
+    date: str | None = None,
 ) -> Answer:
     """Run one scenario at high and at low fidelity; default: the one that the set says."""
     from elevon.cli.fault_options import read_faults

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from elevon.cli import dataset_make
-from elevon.cli.common import ForceOption
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 
-app = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
+app = group("Describe, verify, export, split a data set.")
 dataset_make.add_to(app)
-
-FolderArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The campaign's folder.")]
 
 
 @command(app)
-def describe(folder: FolderArgument) -> Answer:
+def describe(folder: Path) -> Answer:
     """Say what is in a data set: runs, faults, distributions, columns."""
     from elevon.campaign import load_campaign
     from elevon.campaign.describe import describe as described
@@ -43,7 +40,7 @@ def _print_about(about: dict[str, Any]) -> None:
 
 
 @command(app)
-def verify(folder: FolderArgument) -> Answer:
+def verify(folder: Path) -> Answer:
     """Check that every file is as written, every run there once, and nothing leaks: exit 0 or 1."""
     from elevon.campaign.verify import verify as verified
     from elevon.report import all_passed, verdict
@@ -68,14 +65,12 @@ def verify(folder: FolderArgument) -> Answer:
 
 @command(app)
 def export(
-    folder: FolderArgument,
+    folder: Path,
     *,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the files.")],
-    form: Annotated[str, typer.Option("--format", help="mat, csv, nc or parquet.")] = "mat",
-    runs: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Such as 0-99,250; default all.")
-    ] = None,
-    force: ForceOption = False,
+    out: Path,
+    form: str = "mat",
+    runs: str | None = None,
+    force: bool = False,
 ) -> Answer:
     """Write one file a run and a table of the runs, for MATLAB and other programs."""
     from elevon.campaign import load_campaign
@@ -97,15 +92,11 @@ def export(
 
 @command(app)
 def split(
-    folder: FolderArgument,
+    folder: Path,
     *,
-    share: Annotated[
-        list[str], typer.Option("--share", metavar="NAME=SHARE", help="A part; repeatable.")
-    ],
-    by: Annotated[
-        str | None, typer.Option(help="unit or draw; default unit where there are units.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the dealing.")] = 0,
+    share: list[str],
+    by: str | None = None,
+    seed: int = 0,
 ) -> Answer:
     """Deal whole units or draws to parts anew; the samples stay as they are."""
     from elevon.campaign.resplit import resplit
@@ -117,7 +108,7 @@ def split(
 
 
 @command(app)
-def repair(folder: FolderArgument) -> Answer:
+def repair(folder: Path) -> Answer:
     """Rebuild damaged manifest, plans, table and log from what is whole; simulates nothing."""
     from elevon.campaign.repair import repair as repaired
 

@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar
 from elevon.cli.shell import Answer, command
 
-_make = typer.Typer(rich_markup_mode=None, no_args_is_help=True, cls=NamingGroup)
+_make = group("Make a documented data set.")
 
 
 def add_to(app: typer.Typer) -> None:
     """Add the commands to ``elevon dataset``."""
-    app.add_typer(_make, name="make", help="Make a documented data set.")
+    app.add_typer(_make, name="make")
     command(app)(score)
-
-
-@_make.callback()
-def make() -> None:
-    """Make a documented data set."""
 
 
 @command(_make)
 def benchmark(
     *,
-    out: Annotated[
-        Path,
-        typer.Option("--out", metavar="DIR", help="Folder of the data set; resumed if begun."),
-    ],
-    size: Annotated[str, typer.Option(help="small or full.")] = "small",
-    runs: Annotated[
-        int | None, typer.Option(min=1, help="About so many runs, in place of --size.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything drawn.")] = 0,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads; default one a core.")] = None,
-    scores: Annotated[bool, typer.Option(help="Compute the baseline scores too.")] = True,
+    out: Path,
+    size: str = "small",
+    runs: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    scores: bool = True,
 ) -> Answer:
     """Make the benchmark set: three actuators, faults that grow, a bench that does not match."""
     from elevon.benchmark import make_benchmark, score_benchmark
@@ -59,9 +49,9 @@ def benchmark(
 
 
 def score(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A benchmark set.")],
+    folder: Path,
     *,
-    seed: Annotated[int, typer.Option(min=0, help="Of the forests.")] = 0,
+    seed: int = 0,
 ) -> Answer:
     """Score the baseline on a benchmark set: a random forest on the features, nothing tuned."""
     from elevon.benchmark import score_benchmark

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from elevon.cli import interrupt
-from elevon.cli.common import ForceOption, SeedOption
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 
@@ -25,19 +24,10 @@ app = typer.Typer(rich_markup_mode=None)
 @command(app)
 def demo(
     *,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for reports and logs.")] = Path(
-        "out/demo"
-    ),
-    which: Annotated[
-        str,
-        typer.Option(
-            "--part",
-            help="life: a unit wears, is inspected, diagnosed, its end predicted. "
-            "bench: a published table, then a bench's hidden values from its logs.",
-        ),
-    ] = "life",
-    seed: SeedOption = 0,
-    force: ForceOption = False,
+    out: Path = Path("out/demo"),
+    which: str = "life",
+    seed: int = 0,
+    force: bool = False,
 ) -> Answer:
     """Let a unit live and predict its end from bench logs; one page tells the story.
 

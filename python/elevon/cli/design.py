@@ -2,42 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table
 from elevon.cli.shell import Answer, command
 from elevon.units import parse_quantity
 
-app = typer.Typer(
-    no_args_is_help=True,
-    cls=NamingGroup,
-    rich_markup_mode=None,
-    help="Design experiments and parts.",
-)
-
-
-@app.callback()
-def _design() -> None:
-    """Design experiments and parts."""
+app = group("Design experiments and parts.")
 
 
 @command(app)
 def spring(
     *,
-    wire: Annotated[str, typer.Option(help="Wire diameter.")] = "3 mm",
-    coil: Annotated[str, typer.Option(help="Mean coil diameter.")] = "34 mm",
-    torque: Annotated[str, typer.Option(help="Greatest torque on the gearbox.")] = "12 N m",
-    guide: Annotated[str, typer.Option(help="Diameter of the winding guide.")] = "160 mm",
-    force: Annotated[str, typer.Option(help="Design force of each spring.")] = "80 N",
-    extension: Annotated[str, typer.Option(help="Extension at that force.")] = "1.3 m",
-    modulus: Annotated[str, typer.Option(help="Shear modulus of the wire.")] = "81500 N/mm2",
-    strength: Annotated[str, typer.Option(help="Strength of the wire.")] = "1730 N/mm2",
-    safety: Annotated[str, typer.Option(help="Safety factor.")] = "2",
-    longest: Annotated[str, typer.Option(help="Greatest free length of other designs.")] = "1.1 m",
-    mover: Annotated[str, typer.Option(help="Displacement of the mover.")] = "10 mm",
+    wire: str = "3 mm",
+    coil: str = "34 mm",
+    torque: str = "12 N m",
+    guide: str = "160 mm",
+    force: str = "80 N",
+    extension: str = "1.3 m",
+    modulus: str = "81500 N/mm2",
+    strength: str = "1730 N/mm2",
+    safety: str = "2",
+    longest: str = "1.1 m",
+    mover: str = "10 mm",
 ) -> Answer:
     """Size the load module's springs: stress check, stiffness, other designs that do as well."""
     from elevon.bench.spring import SpringTask, design_spring, search_springs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -23,48 +23,23 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force")
 def diagnose(
-    logs: common.LogsArgument,
+    logs: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    loadcell: common.LoadcellOption = None,
-    command: common.CommandOption = None,
-    column_map: common.MapOption = None,
-    baseline: common.BaselineOption = None,
-    method: Annotated[
-        str,
-        typer.Option(help="model, surrogate, both (it proposes, the model refines) or learned."),
-    ] = "model",
-    model: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="For --method learned: by elevon learn, diagnose-train."),
-    ] = None,
-    surrogate: Annotated[
-        Path | None,
-        typer.Option(help="Surrogate by elevon diagnose-train; default: the package's own."),
-    ] = None,
-    spread: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Spread by elevon learn-spread; default: the stated."),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
-    ] = None,
-    false_alarm: Annotated[
-        float, typer.Option("--false-alarm", help="Rate of healthy logs called faulty.")
-    ] = 0.05,
-    append: Annotated[
-        Path | None,
-        typer.Option(
-            "--append", metavar="HISTORY", help="Add the answer to this folder of inspections."
-        ),
-    ] = None,
-    usage: Annotated[
-        str | None,
-        typer.Option("--usage", metavar="N", help="Use at it; the first one as '600 flights'."),
-    ] = None,
-    settings: common.SetOption = None,
-    force: common.ForceOption = False,
+    actuator: str,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    column_map: Path | None = None,
+    baseline: list[Path] | None = None,
+    method: str = "model",
+    model: Path | None = None,
+    surrogate: Path | None = None,
+    spread: Path | None = None,
+    fault: list[str] | None = None,
+    false_alarm: float = 0.05,
+    append: Path | None = None,
+    usage: str | None = None,
+    settings: list[str] | None = None,
+    force: bool = False,
 ) -> Answer:
     """Diagnose the unit that wrote the logs, all in one condition."""
     from elevon.diagnose.door import diagnose as run

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from elevon.cli.common import ForceOption, SeedOption, check_outputs, read_actuator
+from elevon.cli.common import check_outputs, read_actuator
 from elevon.cli.output import answer, print_table, progress_bar
 from elevon.cli.shell import Answer, command
 
@@ -17,23 +17,15 @@ app = typer.Typer(rich_markup_mode=None)
 @command(app)
 def diagnose_train(
     *,
-    actuator: Annotated[
-        str, typer.Option(metavar="ACTUATOR", help="Units are drawn about it.")
-    ] = "torino-rotary",
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Surrogate to write (.npz).")],
-    units: Annotated[int, typer.Option(min=8, help="Units on the switching model.")] = 240,
-    low_units: Annotated[
-        int, typer.Option(min=0, help="More units, on the reduced-order model.")
-    ] = 480,
-    test_units: Annotated[
-        int, typer.Option(min=0, help="Units of another seed that only judge it.")
-    ] = 48,
-    rounds: Annotated[int, typer.Option(min=10, help="Training steps of a network.")] = 5000,
-    runs: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Keeps the runs, and goes on from there.")
-    ] = None,
-    seed: SeedOption = 0,
-    force: ForceOption = False,
+    actuator: str = "torino-rotary",
+    out: Path,
+    units: int = 240,
+    low_units: int = 480,
+    test_units: int = 48,
+    rounds: int = 5000,
+    runs: Path | None = None,
+    seed: int = 0,
+    force: bool = False,
 ) -> Answer:
     """Simulate drawn units on the bench's tests, train, and write the surrogate."""
     from elevon.training.training import trained

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -20,19 +20,16 @@ _FILES = ("doctor.html", "doctor.json", "map.toml")
 
 @command(app, "strict", "details", "force")
 def doctor(
-    logs: common.LogsArgument,
+    logs: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    baseline: common.BaselineOption = None,
-    column_map: common.MapOption = None,
-    loadcell: common.LoadcellOption = None,
-    command: common.CommandOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write page, answer and guessed map into this folder."),
-    ] = None,
-    settings: common.SetOption = None,
-    force: common.ForceOption = False,
+    actuator: str,
+    baseline: list[Path] | None = None,
+    column_map: Path | None = None,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    out: Path | None = None,
+    settings: list[str] | None = None,
+    force: bool = False,
 ) -> Answer:
     """Look at logs for the first time: columns, data, the model's fit, the verdict."""
     from elevon.doctor.door import doctor as run

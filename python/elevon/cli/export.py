@@ -3,61 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from elevon.cli import completion
-from elevon.cli.common import ActuatorArgument, FidelityOption, ForceOption
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import group
 from elevon.cli.output import answer
 from elevon.cli.shell import Answer, command
 
-app = typer.Typer(
-    rich_markup_mode=None,
-    no_args_is_help=True,
-    cls=NamingGroup,
-    help="Write an actuator for other tools (docs/how-to/deploy.md).",
-)
-
-OutOption = Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The file to write.")]
-ModeOption = Annotated[
-    str | None,
-    typer.Option(help="What the command demands: position, speed, torque; a gear: its commands."),
-]
-SignalsOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--signals",
-        metavar="NAMES",
-        help="Outputs beyond the drive log's: signals or groups, by commas; repeatable.",
-        autocompletion=completion.signals,
-    ),
-]
-
-
-@app.callback()
-def export() -> None:
-    """Write an actuator for other tools (docs/how-to/deploy.md)."""
+app = group("Write an actuator for other tools (docs/how-to/deploy.md).")
 
 
 @command(app)
 def fmu(
-    actuator: ActuatorArgument,
+    actuator: str,
     *,
-    out: OutOption,
-    fidelity: FidelityOption = "high",
-    version: Annotated[str, typer.Option(help="Of FMI: 2.0 or 3.0.")] = "3.0",
-    mode: ModeOption = None,
-    signals: SignalsOption = None,
-    step: Annotated[
-        str, typer.Option(help="Suggested communication step: a whole number of solver steps.")
-    ] = "1 ms",
-    platform: Annotated[
-        str | None,
-        typer.Option(help="As FMI 3.0 names it, such as x86_64-linux; this installation's."),
-    ] = None,
-    force: ForceOption = False,
+    out: Path,
+    fidelity: str = "high",
+    version: str = "3.0",
+    mode: str | None = None,
+    signals: list[str] | None = None,
+    step: str = "1 ms",
+    platform: str | None = None,
+    force: bool = False,
 ) -> Answer:
     """Write an FMU for co-simulation: inputs, faults' severities, outputs, parameters."""
     from elevon.deploy import export_fmu
@@ -75,22 +40,14 @@ def fmu(
 
 @command(app)
 def run(
-    actuator: ActuatorArgument,
+    actuator: str,
     *,
-    out: OutOption,
-    fidelity: FidelityOption = "high",
-    mode: ModeOption = None,
-    signals: SignalsOption = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--fault",
-            metavar="KIND@PLACE",
-            help="Held by the equations from the start; repeatable.",
-            autocompletion=completion.faults,
-        ),
-    ] = None,
-    force: ForceOption = False,
+    out: Path,
+    fidelity: str = "high",
+    mode: str | None = None,
+    signals: list[str] | None = None,
+    fault: list[str] | None = None,
+    force: bool = False,
 ) -> Answer:
     """Write the document that the C interface makes a run from."""
     from elevon.deploy import run_document

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -16,19 +15,12 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app)
 def features(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording, or a log to import.")],
+    log: Path,
     *,
-    wanted: Annotated[
-        str, typer.Option("--features", help="Names, families or all, with commas between.")
-    ] = "all",
-    role: Annotated[
-        list[str] | None,
-        typer.Option("--role", metavar="ROLE=CHANNEL", help="Which channel serves; repeatable."),
-    ] = None,
-    pole_pairs: Annotated[
-        float | None, typer.Option(help="Of the motor: for features per electrical turn.")
-    ] = None,
-    clock: Annotated[str | None, typer.Option(help="Clock whose channels serve.")] = None,
+    wanted: str = "all",
+    role: list[str] | None = None,
+    pole_pairs: float | None = None,
+    clock: str | None = None,
 ) -> Answer:
     """Compute features of a log, by the code that computes them while simulating."""
     from elevon.features import recording_features

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -22,17 +22,14 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "report", "date")
 def fit_low(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    settings: common.SetOption = None,
-    scenario: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="FILE", help="Scenario to fit to instead of the stated list."),
-    ] = None,
-    fault: common.FaultOption = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the set.")] = None,
-    seed: common.SeedOption = 0,
-    force: common.ForceOption = False,
+    settings: list[str] | None = None,
+    scenario: list[Path] | None = None,
+    fault: list[str] | None = None,
+    out: Path | None = None,
+    seed: int = 0,
+    force: bool = False,
 ) -> Answer:
     """Fit the reduced-order model's free numbers to the switching model over scenarios, faults."""
     from elevon.lowfit import fit_low as run

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -19,15 +20,15 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force")
 def fleet(
-    histories: common.HistoriesArgument,
+    histories: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    mission: common.MissionOption,
-    early: Annotated[float, typer.Option(help="Cost of one unit of use thrown away.")] = 1.0,
-    late: Annotated[float, typer.Option(help="Cost of a failure in service.")] = 10_000.0,
-    visit: Annotated[float, typer.Option(help="Cost of a visit, for all units at it.")] = 500.0,
-    settings: common.SetOption = None,
-    seed: common.SeedOption = 0,
+    actuator: str,
+    mission: Path,
+    early: float = 1.0,
+    late: float = 10_000.0,
+    visit: float = 500.0,
+    settings: list[str] | None = None,
+    seed: int = 0,
 ) -> Answer:
     """Predict several units of one type and group their maintenance."""
     from elevon.prognose.door import fleet as run

@@ -40,5 +40,12 @@ class NamingGroup(typer.core.TyperGroup):
             formatter.write_dl(rows)
 
 
+def group(text: str, kind: type[NamingGroup] = NamingGroup) -> typer.Typer:
+    """Return a group of commands; it stays one where it has a single command."""
+    app = typer.Typer(no_args_is_help=True, cls=kind, rich_markup_mode=None, help=text)
+    app.callback()(lambda: None)
+    return app
+
+
 def _first_line(text: str | None) -> str:
     return " ".join((text or "").partition("\n\n")[0].split())

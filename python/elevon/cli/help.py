@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Any, get_args
 
 import typer
 import typer.core
-from typer.models import OptionInfo
 
-from elevon.cli.examples import EXAMPLES
+from elevon.cli.tables import read_table
 
 #: Options whose text is a number with its unit.
 _QUANTITIES = frozenset((
@@ -38,47 +36,10 @@ def metavar_of(name: str, kind: object) -> str:
     return "QUANTITY" if name in _QUANTITIES else name.rpartition("_")[2].upper()
 
 
-def with_metavars(annotations: dict[str, Any]) -> dict[str, Any]:
-    """Return annotations whose options have metavars; one that states its own keeps it."""
-    return {name: _styled(name, annotation) for name, annotation in annotations.items()}
-
-
-def _styled(name: str, annotation: Any) -> Any:
-    if get_origin(annotation) is not Annotated:
-        return annotation
-    inner, *notes = get_args(annotation)
-    kind = _plain_type(inner)
-    changed = []
-    for note in notes:
-        if isinstance(note, OptionInfo) and note.metavar is None and kind is not bool:
-            note = copy.copy(note)  # noqa: PLW2901 - an alias serves many commands
-            note.metavar = metavar_of(name, kind)
-        changed.append(note)
-    return Annotated[(inner, *changed)]
-
-
-def _plain_type(annotation: Any) -> Any:
+def plain_type(annotation: Any) -> Any:
     """Return the type within ``X | None`` and ``list[X]``."""
     inner = [item for item in get_args(annotation) if item is not type(None)]
-    return _plain_type(inner[0]) if inner else annotation
-
-
-def add_plain(
-    app: typer.Typer, name: str | None = None
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that adds a function as a command with help of this style."""
-
-    def add(work: Callable[..., Any]) -> Callable[..., Any]:
-        app.command(name, cls=PlainCommand)(styled(work))
-        return work
-
-    return add
-
-
-def styled(work: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function whose options have metavars."""
-    work.__annotations__ = with_metavars(get_type_hints(work, include_extras=True))
-    return work
+    return plain_type(inner[0]) if inner else annotation
 
 
 class PlainCommand(typer.core.TyperCommand):
@@ -124,7 +85,7 @@ def write_example(command: Any, ctx: Any, formatter: Any) -> None:
 def example_of(command: Any, path: str) -> str:
     """Return the example of a command by its whole path, such as ``elevon campaign run``."""
     name = path.partition(" ")[2]
-    words = EXAMPLES.get(name)
+    words = read_table("commands.toml")["examples"].get(name)
     if words is None and name.startswith("reproduce "):
         writes = any("--out" in item.opts for item in command.params)
         words = f"--out {name.rpartition(' ')[2]}" if writes else "--json"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -24,43 +24,17 @@ app = typer.Typer(
 
 @command(app)
 def import_(
+    logs: list[Path],
     *,
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG", help="Log files.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Recording to write (.parquet, .nc, .mat, .csv); a folder for several logs."
-        ),
-    ] = None,
-    guess: Annotated[
-        Path | None,
-        typer.Option(help="Write a first column map (TOML) of one log, to be corrected."),
-    ] = None,
-    log_format: Annotated[
-        str,
-        typer.Option(
-            "--format",
-            help="auto, drive, csv, parquet, netcdf, mat, recording or cranfield.",
-        ),
-    ] = "auto",
-    column_map: Annotated[
-        Path | None,
-        typer.Option("--map", help="Column map (TOML), or torino, cranfield, pisa."),
-    ] = None,
-    loadcell: Annotated[
-        list[Path] | None, typer.Option(help="Load-cell file; one for each log, in their order.")
-    ] = None,
-    command: Annotated[
-        list[Path] | None,
-        typer.Option(help="Command note (TOML or JSON); one for each log, or one for all."),
-    ] = None,
-    gear_ratio: Annotated[
-        float | None, typer.Option(help="Motor over output, unless the map says it.")
-    ] = None,
-    sidecars: Annotated[
-        bool, typer.Option(help="Look for NAME_loadcell.csv and NAME_command.json beside a log.")
-    ] = True,
-    force: common.ForceOption = False,
+    out: Path | None = None,
+    guess: Path | None = None,
+    log_format: str = "auto",
+    column_map: Path | None = None,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    gear_ratio: float | None = None,
+    sidecars: bool = True,
+    force: bool = False,
 ) -> Answer:
     """Read logs into recordings, and say everything that was seen on the way."""
     from elevon.errors import unknown

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -19,18 +19,14 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict")
 def learn(
-    logs: common.LogsArgument,
+    logs: list[Path],
     *,
-    labels: Annotated[
-        Path, typer.Option(metavar="FILE", help="Table (CSV): log, label; unit, condition.")
-    ],
-    out: Annotated[Path, typer.Option(metavar="MODEL", help="Model to write (.npz).")],
-    pole_pairs: Annotated[
-        float | None, typer.Option(help="Of the motor: for what turns with the electrical angle.")
-    ] = None,
-    column_map: common.MapOption = None,
-    seed: common.SeedOption = 0,
-    force: common.ForceOption = False,
+    labels: Path,
+    out: Path,
+    pole_pairs: float | None = None,
+    column_map: Path | None = None,
+    seed: int = 0,
+    force: bool = False,
 ) -> Answer:
     """Learn healthy and faulty from labelled logs of a motion that repeats."""
     from elevon.diagnose.learning.classify import learned_classes

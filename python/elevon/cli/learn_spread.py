@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -20,19 +20,16 @@ _RATE = 0.05  # of false alarms, by default
 
 @command(app, "strict")
 def learn_spread(
-    logs: common.LogsArgument,
+    logs: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Spread to write (.toml).")],
-    units: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Table (CSV): log, unit, day. Default: a log a day."),
-    ] = None,
-    loadcell: common.LoadcellOption = None,
-    command: common.CommandOption = None,
-    column_map: common.MapOption = None,
-    settings: common.SetOption = None,
-    force: common.ForceOption = False,
+    actuator: str,
+    out: Path,
+    units: Path | None = None,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    column_map: Path | None = None,
+    settings: list[str] | None = None,
+    force: bool = False,
 ) -> Answer:
     """Learn spread and model mismatch from healthy logs of one unit, or of several."""
     from elevon.diagnose.learning.log_table import log_table, looked_up

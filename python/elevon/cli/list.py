@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from elevon.cli import common, completion
 from elevon.cli.acting import by_drive, check, chosen
-from elevon.cli.groups import NamingGroup
+from elevon.cli.groups import group
 from elevon.cli.output import print_table
 from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
     from elevon.faults import FaultRecord
 
-app = typer.Typer(
-    no_args_is_help=True,
-    cls=NamingGroup,
-    rich_markup_mode=None,
-    help="List what there is, with units and sources.",
-)
+app = group("List what there is, with units and sources.")
 
 
 @command(app)
@@ -39,14 +31,7 @@ def actuators() -> Answer:
 @command(app)
 def procedures(
     *,
-    actuator: Annotated[
-        str | None,
-        typer.Option(
-            "--actuator",
-            help="Only those of the stand it stands on.",
-            autocompletion=completion.actuators,
-        ),
-    ] = None,
+    actuator: str | None = None,
 ) -> Answer:
     """List the virtual bench's procedures, with the stand each is written for."""
     from elevon.actuator import Actuator
@@ -64,9 +49,9 @@ def procedures(
 
 @command(app)
 def signals(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    fidelity: common.FidelityOption = "high",
+    fidelity: str = "high",
 ) -> Answer:
     """List the signals of an actuator that can be recorded."""
     from elevon import _core
@@ -81,10 +66,10 @@ def signals(
 
 @command(app)
 def parameters(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    fidelity: common.OnlyFidelityOption = None,
-    not_modelled: common.NotModelledOption = False,
+    fidelity: str | None = None,
+    not_modelled: bool = False,
 ) -> Answer:
     """List the parameters an actuator's model has: unit, range, meaning, where each acts."""
     from elevon.actuator import Actuator
@@ -114,10 +99,10 @@ def parameters(
 
 @command(app)
 def faults(
-    actuator: common.OptionalActuatorArgument = None,
+    actuator: str | None = None,
     *,
-    fidelity: common.OnlyFidelityOption = None,
-    not_modelled: common.NotModelledOption = False,
+    fidelity: str | None = None,
+    not_modelled: bool = False,
 ) -> Answer:
     """List the fault catalogue: kind, places, unit, range, where each acts, effect, source, rate.
 
@@ -171,7 +156,7 @@ def _fault(record: FaultRecord) -> dict[str, Any]:
 
 @command(app)
 def laws(
-    actuator: common.OptionalActuatorArgument = None,
+    actuator: str | None = None,
 ) -> Answer:
     """List the laws by which faults grow with use: fault, unit, what drives them, source."""
     from elevon.actuator import Actuator
@@ -222,9 +207,9 @@ def waveforms() -> Answer:
 
 @command(app)
 def features(
-    actuator: common.OptionalActuatorArgument = None,
+    actuator: str | None = None,
     *,
-    fidelity: common.FidelityOption = "high",
+    fidelity: str = "high",
 ) -> Answer:
     """List the features of a motion: unit, roles they need, definition.
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from elevon.cli import common, completion, interrupt
-from elevon.cli.help import add_plain
+from elevon.cli import common, interrupt
+from elevon.cli.shell import add_plain
 from elevon.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,60 +19,27 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-_Fidelity = Annotated[str, typer.Option(help="high or low.", autocompletion=completion.fidelities)]
-_Subject = Annotated[
-    str,
-    typer.Argument(
-        metavar="ACTUATOR|FILE",
-        help="Actuator by name or file, or a log or recording to replay.",
-        autocompletion=completion.actuators,
-    ),
-]
-_Calibrated = Annotated[
-    Path | None, typer.Option(help="Actuator file, as elevon calibrate writes it.")
-]
-_Mission = Annotated[Path | None, typer.Option(help="Mission, for the remaining life.")]
-_Port = Annotated[int, typer.Option(min=0, max=65535, help="0: a free one.")]
-_Host = Annotated[str, typer.Option(help="Address to listen on; not loopback: a token is needed.")]
-_NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Open no page.")]
-_Factor = Annotated[float, typer.Option(min=0.1, max=100.0, help="Simulated over wall time.")]
-_Out = Annotated[Path, typer.Option(metavar="DIR", help="Where recordings go.")]
-_HideTruth = Annotated[
-    bool, typer.Option("--hide-truth", help="Tell nobody which faults were set.")
-]
-_Model = Annotated[
-    str, typer.Option(metavar="ACTUATOR", help="Model beside the log that is replayed.")
-]
-_Static = Annotated[
-    Path | None,
-    typer.Option(metavar="DIR", help="Write the page with a recorded session instead."),
-]
-_Picture = Annotated[
-    Path | None, typer.Option(help="Write that session as an animated SVG instead.")
-]
-
-
 @add_plain(app)
 def live(
-    actuator: _Subject = "torino-rotary",
+    actuator: str = "torino-rotary",
     *,
-    fidelity: _Fidelity = "high",
-    calibrated: _Calibrated = None,
-    baseline: common.BaselineOption = None,
-    mission: _Mission = None,
-    port: _Port = 8484,
-    host: _Host = "127.0.0.1",
-    no_browser: _NoBrowser = False,
-    factor: _Factor = 1.0,
-    out: _Out = Path(),
-    hide_truth: _HideTruth = False,
-    map_: common.MapOption = None,
-    model: _Model = "torino-rotary",
-    static: _Static = None,
-    picture: _Picture = None,
-    force: common.ForceOption = False,
-    seed: common.SeedOption = 0,
-    settings: common.SetOption = None,
+    fidelity: str = "high",
+    calibrated: Path | None = None,
+    baseline: list[Path] | None = None,
+    mission: Path | None = None,
+    port: int = 8484,
+    host: str = "127.0.0.1",
+    no_browser: bool = False,
+    factor: float = 1.0,
+    out: Path = Path(),
+    hide_truth: bool = False,
+    map_: Path | None = None,
+    model: str = "torino-rotary",
+    static: Path | None = None,
+    picture: Path | None = None,
+    force: bool = False,
+    seed: int = 0,
+    settings: list[str] | None = None,
 ) -> None:
     """Show an actuator at real time in the browser: move it, break it, watch it being found out."""
     common.check_outputs([static / "index.html" if static else None, picture], force=force)

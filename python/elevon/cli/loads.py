@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from elevon.cli.common import ActuatorOption, ForceOption
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 
@@ -26,40 +25,21 @@ KINDS = (".csv", ".toml")
 
 @command(app)
 def loads(
-    flight: Annotated[
-        Path,
-        typer.Argument(metavar="FLIGHT", help="Columns with units; see docs/how-to/loads.md."),
-    ],
+    flight: Path,
     *,
-    actuator: ActuatorOption,
-    out: Annotated[
-        Path,
-        typer.Option(metavar="FILE", help=".csv: the table; .toml: a scenario that flies it."),
-    ],
-    area: Annotated[str, typer.Option(help="Area of the surface behind its hinge, '0.9 m2'.")],
-    chord: Annotated[str, typer.Option(help="Mean chord behind the hinge, '450 mm'.")],
-    c_0: Annotated[float, typer.Option("--c-0", help="Hinge-moment coefficient at rest.")] = 0.0,
-    c_alpha: Annotated[
-        float, typer.Option("--c-alpha", help="Per radian of the angle of attack.")
-    ] = 0.0,
-    c_delta: Annotated[
-        float, typer.Option("--c-delta", help="Per radian of the deflection.")
-    ] = 0.0,
-    arm: Annotated[
-        str | None, typer.Option(help="Lever between hinge and ram; not for a turning output.")
-    ] = None,
-    limit: Annotated[
-        str | None,
-        typer.Option(help="Largest load after scaling; by default the actuator's rating.load."),
-    ] = None,
-    travel: Annotated[
-        str | None, typer.Option(help="Largest position after scaling; by default as flown.")
-    ] = None,
-    unscaled: Annotated[
-        bool, typer.Option("--unscaled", help="Keep the aircraft's load as it is.")
-    ] = False,
-    temperature_offset: Annotated[float, typer.Option(help="K on the standard atmosphere.")] = 0.0,
-    force: ForceOption = False,
+    actuator: str,
+    out: Path,
+    area: str,
+    chord: str,
+    c_0: float = 0.0,
+    c_alpha: float = 0.0,
+    c_delta: float = 0.0,
+    arm: str | None = None,
+    limit: str | None = None,
+    travel: str | None = None,
+    unscaled: bool = False,
+    temperature_offset: float = 0.0,
+    force: bool = False,
 ) -> Answer:
     """Turn a recorded flight into the load of one actuator: a table or a scenario."""
     from elevon.actuator import Actuator

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
 from elevon.cli import common
-from elevon.cli.help import add_plain
 from elevon.cli.output import answer, listed, print_json, say
+from elevon.cli.shell import add_plain
 from elevon.errors import InputError
 from elevon.files import check_output
 from elevon.number_text import severity_texts
@@ -24,59 +24,25 @@ if TYPE_CHECKING:
 app = typer.Typer(rich_markup_mode=None)
 
 
-_Stream = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="LOG", help="Drive logs; - reads lines from standard input as they come."
-    ),
-]
-_Baseline = Annotated[
-    list[Path], typer.Option("--baseline", metavar="LOG", help="Healthy log of it; repeatable.")
-]
-_Window = Annotated[
-    str | None,
-    typer.Option(help="Width of a window, such as '5 s'; default: period of the noted sine."),
-]
-_FalseAlarmTime = Annotated[
-    str, typer.Option("--false-alarm-time", help="Mean time between false alarms.")
-]
-_Fault = Annotated[
-    list[str] | None,
-    typer.Option("--fault", metavar="KIND@PLACE", help="Candidate; repeatable. Default: all."),
-]
-_Days = Annotated[
-    int | None,
-    typer.Option(min=1, help="Days on which the unit is watched. Default: the logs; -: one."),
-]
-_Longest = Annotated[
-    str | None,
-    typer.Option(help="Longest of those days. Default: the logs'; -: that of the baselines."),
-]
-_State = Annotated[
-    Path | None,
-    typer.Option("--state", help="Of -: where the stream stands; goes on from there."),
-]
-
-
 @add_plain(app)
 def monitor(
-    logs: _Stream,
+    logs: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    baseline: _Baseline,
-    window: _Window = None,
-    false_alarm_time: _FalseAlarmTime = "1 h",
-    fault: _Fault = None,
-    days: _Days = None,
-    longest: _Longest = None,
-    state: _State = None,
-    loadcell: common.LoadcellOption = None,
-    command: common.CommandOption = None,
-    column_map: common.MapOption = None,
-    settings: common.SetOption = None,
-    strict: common.StrictOption = False,  # noqa: ARG001 - its callback does the work
-    details: common.DetailsOption = False,  # noqa: ARG001 - its callback does the work
-    json: common.JsonOption = False,
+    actuator: str,
+    baseline: list[Path],
+    window: str | None = None,
+    false_alarm_time: str = "1 h",
+    fault: list[str] | None = None,
+    days: int | None = None,
+    longest: str | None = None,
+    state: Path | None = None,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    column_map: Path | None = None,
+    settings: list[str] | None = None,
+    strict: bool = False,  # noqa: ARG001 - its callback does the work
+    details: bool = False,  # noqa: ARG001 - its callback does the work
+    json: bool = False,
 ) -> None:
     """Watch logs window by window, in the order given, each a day of the unit; alarm at a fault."""
     options = WatchOptions(

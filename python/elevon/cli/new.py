@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from elevon.cli import completion
-from elevon.cli.common import ForceOption
 from elevon.cli.output import answer
 from elevon.cli.shell import Answer, command
 
@@ -24,57 +22,31 @@ Text = str | None
 
 @command(app)
 def new(
-    name: Annotated[
-        str, typer.Argument(metavar="NAME", help="Of the actuator; its file is NAME.toml.")
-    ],
+    name: str,
     *,
-    linear: Annotated[bool, typer.Option("--linear", help="Its ram moves along a line.")] = False,
-    rotary: Annotated[bool, typer.Option("--rotary", help="Its output turns.")] = False,
-    base: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            metavar="ACTUATOR",
-            help="A variant of this one, every parameter a comment; with numbers, of its design.",
-            autocompletion=completion.actuators,
-        ),
-    ] = None,
-    supply: Annotated[Text, _quantity("Supply, such as 28V.")] = None,
-    power: Annotated[Text, _quantity("Rated power at the motor's shaft.")] = None,
-    thrust: Annotated[Text, _quantity("Rated force of the ram.")] = None,
-    torque: Annotated[Text, _quantity("Rated torque of the output.")] = None,
-    speed: Annotated[
-        Text, _quantity("Rated speed of ram or output; ASSUMED from the motor's without.")
-    ] = None,
-    motor_speed: Annotated[
-        Text, _quantity("Rated speed of the motor; ASSUMED 3000 rpm without.")
-    ] = None,
-    lead: Annotated[Text, _quantity("Travel per turn of the screw.")] = None,
-    gear: Annotated[Text, _quantity("Turns of the motor per turn behind the gear.")] = None,
-    encoder: Annotated[Text, _quantity("Counts per turn of the motor.")] = None,
-    efficiency: Annotated[Text, _quantity("Of gear and screw at the rating.")] = None,
-    stroke: Annotated[Text, _quantity("Whole travel, half of it to either side of zero.")] = None,
-    backlash: Annotated[Text, _quantity("Whole backlash at the output.")] = None,
-    mass: Annotated[Text, _quantity("What the ram moves.")] = None,
-    inertia: Annotated[Text, _quantity("What the output moves.")] = None,
-    bandwidth: Annotated[Text, _quantity("Of the position loop.")] = None,
-    motor: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=QUANTITY",
-            help="A constant of the motor's data sheet; repeatable: kind (brushless, servo, dc), "
-            "torque_constant, resistance, inductance, inertia, pole_pairs, current, peak_current.",
-        ),
-    ] = None,
-    title: Annotated[str | None, typer.Option(metavar="TEXT", help="One line.")] = None,
-    source: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="Where the numbers come from.")
-    ] = None,
-    bench: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write a procedure of the virtual bench for it as well."),
-    ] = None,
-    force: ForceOption = False,
+    linear: bool = False,
+    rotary: bool = False,
+    base: str | None = None,
+    supply: Text = None,
+    power: Text = None,
+    thrust: Text = None,
+    torque: Text = None,
+    speed: Text = None,
+    motor_speed: Text = None,
+    lead: Text = None,
+    gear: Text = None,
+    encoder: Text = None,
+    efficiency: Text = None,
+    stroke: Text = None,
+    backlash: Text = None,
+    mass: Text = None,
+    inertia: Text = None,
+    bandwidth: Text = None,
+    motor: list[str] | None = None,
+    title: str | None = None,
+    source: str | None = None,
+    bench: Path | None = None,
+    force: bool = False,
 ) -> Answer:
     """Write NAME.toml: an actuator from few numbers of a data sheet, or a variant of another."""
     from elevon.cli.new_design import New, given_numbers

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -18,18 +19,14 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force")
 def next_inspection(
-    history: common.HistoryArgument,
+    history: Path,
     *,
-    actuator: common.ActuatorOption,
-    mission: common.MissionOption,
-    risk: Annotated[
-        float, typer.Option("--risk", metavar="P", help="Accepted probability of failing before.")
-    ] = 0.01,
-    particles: Annotated[
-        int, typer.Option("--particles", min=100, max=100_000, help="Possible units drawn.")
-    ] = 2000,
-    settings: common.SetOption = None,
-    seed: common.SeedOption = 0,
+    actuator: str,
+    mission: Path,
+    risk: float = 0.01,
+    particles: int = 2000,
+    settings: list[str] | None = None,
+    seed: int = 0,
 ) -> Answer:
     """Say until when the unit in HISTORY can go unseen at a risk, and with which test to look."""
     from elevon.prognose.door import next_inspection as run

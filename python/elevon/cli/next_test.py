@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -20,12 +20,9 @@ app = typer.Typer(rich_markup_mode=None)
 @command(app)
 def next_test(
     *,
-    actuator: common.ActuatorOption,
-    so_far: Annotated[
-        list[Path] | None,
-        typer.Option("--so-far", metavar="RESULT", help="JSON of elevon diagnose; repeatable."),
-    ] = None,
-    settings: common.SetOption = None,
+    actuator: str,
+    so_far: list[Path] | None = None,
+    settings: list[str] | None = None,
 ) -> Answer:
     """Propose the bench's test with the largest expected information on what is ambiguous."""
     from elevon.nexttest.door import next_test as choose

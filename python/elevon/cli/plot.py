@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -23,40 +23,15 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app)
 def plot(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="Recording, log, folder of a campaign, or result (JSON)."
-        ),
-    ],
+    file: Path,
     *,
-    signal: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--signal", metavar="NAME", help="Only this one; repeatable. Default: how it ran."
-        ),
-    ] = None,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help=".html: an interactive page; .png, .svg, .pdf: a picture; repeatable. "
-            "Default: a page named after FILE, here.",
-        ),
-    ] = None,
-    run: Annotated[
-        int | None, typer.Option("--run", metavar="N", min=0, help="Of a campaign. Default: 0.")
-    ] = None,
-    column_map: common.MapOption = None,
-    compare: Annotated[
-        Path | None,
-        typer.Option("--compare", metavar="FILE", help="Another recording or log drawn over it."),
-    ] = None,
-    spectra: Annotated[
-        bool, typer.Option("--spectra", help="Add spectra of error, current and speed.")
-    ] = False,
-    force: common.ForceOption = False,
+    signal: list[str] | None = None,
+    out: list[Path] | None = None,
+    run: int | None = None,
+    column_map: Path | None = None,
+    compare: Path | None = None,
+    spectra: bool = False,
+    force: bool = False,
 ) -> Answer:
     """Draw a recording, a log, a run of a campaign or a result; nothing is shown on a display."""
     targets = _targets(file, out)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -18,22 +19,15 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force")
 def predict(
-    history: common.HistoryArgument,
+    history: Path,
     *,
-    actuator: common.ActuatorOption,
-    mission: common.MissionOption,
-    survive: Annotated[
-        list[float] | None,
-        typer.Option("--survive", metavar="N", help="Probability of the next N; repeatable."),
-    ] = None,
-    particles: Annotated[
-        int, typer.Option("--particles", min=100, max=100_000, help="Possible units drawn.")
-    ] = 2000,
-    snapshots: Annotated[
-        bool, typer.Option("--snapshots", help="Correct the tables by runs at high fidelity.")
-    ] = False,
-    settings: common.SetOption = None,
-    seed: common.SeedOption = 0,
+    actuator: str,
+    mission: Path,
+    survive: list[float] | None = None,
+    particles: int = 2000,
+    snapshots: bool = False,
+    settings: list[str] | None = None,
+    seed: int = 0,
 ) -> Answer:
     """Predict the remaining useful life of the unit whose inspections are in HISTORY."""
     from elevon.prognose.door import predict as run

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -19,46 +19,24 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict")
 def response(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    low: Annotated[
-        str | None, typer.Option("--from", help="Lowest frequency; by default 0.5 Hz.")
-    ] = None,
-    high: Annotated[
-        str | None,
-        typer.Option("--to", help="Highest frequency; by default 20 Hz, of a loop 2 kHz."),
-    ] = None,
-    loop: Annotated[
-        str | None,
-        typer.Option(help="Measure an open loop and its margins: position, speed or current."),
-    ] = None,
-    amplitude: Annotated[
-        str | None, typer.Option(help="Greatest command about its mean; by default 1 deg or 1 mm.")
-    ] = None,
-    output: Annotated[
-        str | None, typer.Option(help="Signal that answers; by default output_position.")
-    ] = None,
-    mode: Annotated[
-        str | None, typer.Option(help="Commanded: position (default), speed or torque.")
-    ] = None,
-    bias: Annotated[str, typer.Option(help="Mean of the command.")] = "0",
-    load: Annotated[str, typer.Option(help="Constant load on the output side.")] = "0",
-    method: Annotated[str | None, typer.Option(help="multisine (default) or sweep.")] = None,
-    realisations: Annotated[int, typer.Option(min=1, help="Independent inputs.")] = 6,
-    fidelity: common.FidelityOption = "high",
-    linear: Annotated[
-        bool,
-        typer.Option(
-            "--linear",
-            help="Add the linear model of the low fidelity, and the band in which it holds.",
-        ),
-    ] = False,
-    settings: common.SetOption = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Bode plot: .png, .svg or .pdf.")
-    ] = None,
-    seed: common.SeedOption = 0,
-    force: common.ForceOption = False,
+    low: str | None = None,
+    high: str | None = None,
+    loop: str | None = None,
+    amplitude: str | None = None,
+    output: str | None = None,
+    mode: str | None = None,
+    bias: str = "0",
+    load: str = "0",
+    method: str | None = None,
+    realisations: int = 6,
+    fidelity: str = "high",
+    linear: bool = False,
+    settings: list[str] | None = None,
+    plot: Path | None = None,
+    seed: int = 0,
+    force: bool = False,
 ) -> Answer:
     """Measure gain, phase and coherence from the command to a signal by simulation.
 

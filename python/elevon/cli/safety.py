@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -16,18 +16,14 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app)
 def safety(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    every: Annotated[
-        int, typer.Option(min=1, help="Only each so-manieth situation: a short form.")
-    ] = 1,
-    settings: common.SetOption = None,
-    seed: common.SeedOption = 0,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for report.html and result.json.")
-    ] = None,
-    force: common.ForceOption = False,
-    date: Annotated[str | None, typer.Option(help="Date printed in the report.")] = None,
+    every: int = 1,
+    settings: list[str] | None = None,
+    seed: int = 0,
+    out: Path | None = None,
+    force: bool = False,
+    date: str | None = None,
 ) -> Answer:
     """Run every failure, pairs and triples of them in every situation; list the hazards left."""
     import json as text

@@ -6,25 +6,27 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, get_type_hints
+from pathlib import Path
+from typing import Any
 
 import typer
 
-from elevon.cli import common
-from elevon.cli.help import PlainCommand, with_metavars
+from elevon.cli.help import PlainCommand
+from elevon.cli.options import declared, shared_option
 from elevon.cli.output import print_json, say
 from elevon.files import check_output
 from elevon.report import Report
 from elevon.results import Result
 
-#: Options that a command names instead of taking them; the callbacks of some do their work.
+#: Options that a command names instead of taking them: type and default. The callbacks of some do
+#: their work.
 _SHARED: Mapping[str, tuple[object, object]] = {
-    "strict": (common.StrictOption, False),
-    "details": (common.DetailsOption, False),
-    "json": (common.JsonOption, False),
-    "report": (common.ReportOption, None),
-    "force": (common.ForceOption, False),
-    "date": (common.DateOption, None),
+    "strict": (bool, False),
+    "details": (bool, False),
+    "json": (bool, False),
+    "report": (Path | None, None),
+    "force": (bool, False),
+    "date": (str | None, None),
 }
 
 
@@ -65,13 +67,28 @@ def command(
     return add
 
 
+def add_plain(
+    app: typer.Typer, name: str | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator that adds a function as a command that prints and exits by itself."""
+
+    def add(work: Callable[..., Any]) -> Callable[..., Any]:
+        app.command(name, cls=PlainCommand)(styled(work))
+        return work
+
+    return add
+
+
+def styled(work: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function whose parameters have what `options.toml` says of them."""
+    work.__annotations__ = declared(work)
+    return work
+
+
 def _shell(work: Callable[..., Answer], shared: tuple[str, ...]) -> Callable[..., int]:
     parameters = inspect.signature(work).parameters
     extra = [name for name in shared if name not in parameters]
-    hints = get_type_hints(work, include_extras=True)
-    hints |= {name: _SHARED[name][0] for name in extra}
-    hints.pop("return", None)
-    hints = with_metavars(hints)
+    hints = declared(work) | {name: shared_option(name, _SHARED[name][0]) for name in extra}
 
     @wraps(work)
     def shell(**options: Any) -> int:

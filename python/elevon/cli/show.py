@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
@@ -17,27 +17,16 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app)
 def show(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    settings: common.SetOption = None,
-    svg: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the block diagram as SVG.")
-    ] = None,
-    schema: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the JSON Schema of its actuator files."),
-    ] = None,
-    changed: Annotated[
-        bool,
-        typer.Option(
-            "--changed",
-            help="Only what is neither derived by a rule nor neutral: given or assumed.",
-        ),
-    ] = False,
-    notes: Annotated[bool, typer.Option("--notes", help="Show the notes as well.")] = False,
-    fidelity: common.OnlyFidelityOption = None,
-    not_modelled: common.NotModelledOption = False,
-    force: common.ForceOption = False,
+    settings: list[str] | None = None,
+    svg: Path | None = None,
+    schema: Path | None = None,
+    changed: bool = False,
+    notes: bool = False,
+    fidelity: str | None = None,
+    not_modelled: bool = False,
+    force: bool = False,
 ) -> Answer:
     """Show an actuator: block diagram, parameters with units, sources, where they act; references.
 

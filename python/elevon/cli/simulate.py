@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -22,29 +22,20 @@ _PLOTS = (".png", ".svg", ".pdf", ".html")
 
 @command(app, "strict")
 def simulate(
-    actuator: common.ActuatorArgument,
+    actuator: str,
     *,
-    scenario: common.ScenarioOption = None,
-    duration: common.DurationOption = None,
-    settings: common.SetOption = None,
-    fault: common.FaultOption = None,
-    fidelity: common.FidelityOption = "high",
-    record: common.RecordOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Save the recording: .parquet, .nc, .csv or .mat."),
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Plot it: .png, .svg, .pdf or .html.")
-    ] = None,
-    seed: common.SeedOption = 0,
-    compare: Annotated[
-        Path | None, typer.Option(metavar="REC", help="Another recording drawn over this one.")
-    ] = None,
-    spectra: Annotated[
-        bool, typer.Option("--spectra", help="Add spectra of error, current and speed to the plot.")
-    ] = False,
-    force: common.ForceOption = False,
+    scenario: Path | None = None,
+    duration: str | None = None,
+    settings: list[str] | None = None,
+    fault: list[str] | None = None,
+    fidelity: str = "high",
+    record: list[str] | None = None,
+    out: Path | None = None,
+    plot: Path | None = None,
+    seed: int = 0,
+    compare: Path | None = None,
+    spectra: bool = False,
+    force: bool = False,
 ) -> Answer:
     """Simulate one actuator and keep what it did."""
     from elevon.recording.formats import files_of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -19,15 +20,15 @@ app = typer.Typer(rich_markup_mode=None)
 
 @command(app, "strict", "details", "report", "force", "date")
 def validate(
-    logs: common.LogsArgument,
+    logs: list[Path],
     *,
-    actuator: common.ActuatorOption,
-    loadcell: common.LoadcellOption = None,
-    command: common.CommandOption = None,
-    column_map: common.MapOption = None,
-    fidelity: common.FidelityOption = "low",
-    transient: common.TransientOption = None,
-    settings: common.SetOption = None,
+    actuator: str,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    column_map: Path | None = None,
+    fidelity: str = "low",
+    transient: float | None = None,
+    settings: list[str] | None = None,
 ) -> Answer:
     """Compare the model with logs, signal by signal; exit 1 where a threshold fails."""
     from elevon.calibrate.door import validate as run

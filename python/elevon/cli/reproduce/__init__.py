@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import typer
-
-from elevon.cli.groups import NamingGroup, UsageError
-from elevon.cli.help import styled
+from elevon.cli.groups import NamingGroup, UsageError, group
 from elevon.cli.reproduce.all_cases import reproduce_all
 from elevon.cli.reproduce.case import add_command
 from elevon.cli.reproduce.cases import CASES
+from elevon.cli.shell import styled
 
 #: What judges Elevon itself stands outside the package.
 STUDIES = (
@@ -40,12 +38,7 @@ class _Group(NamingGroup):
         return super().resolve_command(ctx, args)
 
 
-app = typer.Typer(
-    no_args_is_help=True,
-    cls=_Group,
-    rich_markup_mode=None,
-    help="Recompute a published table or figure; exit code 1 when a check fails.",
-)
+app = group("Recompute a published table or figure; exit code 1 when a check fails.", _Group)
 
 
 app.callback(invoke_without_command=True)(styled(reproduce_all))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -19,38 +19,17 @@ if TYPE_CHECKING:
     from elevon.reproduce.everything import CaseRun
 
 
-_ALL = Annotated[bool, typer.Option("--all", help="Every published case, one index.")]
-_OUT = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="DIR", help="With --all: folder of index and cases."),
-]
-_ONLY = Annotated[
-    list[str] | None,
-    typer.Option("--only", metavar="CASE", help="With --all: only this one; repeatable."),
-]
-_DATA = Annotated[
-    Path | None,
-    typer.Option("--data", metavar="DIR", help="With --all: the foreign data; else not run."),
-]
-_SEED = Annotated[
-    int, typer.Option("--seed", min=0, help="With --all: seed of every random number.")
-]
-_DATE = Annotated[str | None, typer.Option("--date", help="With --all: date on the index.")]
-_FORCE = Annotated[bool, typer.Option("--force", help="With --all: replace another index.")]
-_JSON = Annotated[bool, typer.Option("--json", help="With --all: print one JSON object.")]
-
-
 def reproduce_all(
     context: typer.Context,
     *,
-    everything: _ALL = False,
-    out: _OUT = None,
-    only: _ONLY = None,
-    data: _DATA = None,
-    seed: _SEED = 0,
-    date: _DATE = None,
-    force: _FORCE = False,
-    as_json: _JSON = False,
+    everything: bool = False,
+    out: Path | None = None,
+    only: list[str] | None = None,
+    data: Path | None = None,
+    seed: int = 0,
+    date: str | None = None,
+    force: bool = False,
+    as_json: bool = False,
 ) -> int:
     """Recompute a published table or figure; exit code 1 when a check fails."""
     case = context.invoked_subcommand

@@ -7,12 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from elevon.cli.help import PlainCommand, with_metavars
+from elevon.cli.help import PlainCommand
+from elevon.cli.options import annotated
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
+from elevon.cli.tables import read_table
 from elevon.reproduce.catalogue import Published, published
 
 if TYPE_CHECKING:
@@ -21,14 +23,8 @@ if TYPE_CHECKING:
 Options = Mapping[str, Any]
 Values = dict[str, Any]
 
-_JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-_OUT = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="DIR", help="Folder for report.html and the rows as CSV."),
-]
-_FORCE = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
-_SEED = Annotated[int, typer.Option("--seed", min=0, help="Seed of every random number.")]
-_DATE = Annotated[str | None, typer.Option("--date", help="Date printed in the report.")]
+#: Types that an option without a default may state.
+_TYPES: Mapping[str, Any] = {"path": Path, "texts": list[str], "count": int}
 
 
 @dataclass(frozen=True)
@@ -50,8 +46,9 @@ class PublishedCase:
         Above that table.
     page : str
         Result to the report; empty: nothing is written.
-    options : mapping of str to (annotation, default)
-        Options beyond those that every case has.
+    options : mapping of str to mapping
+        Options beyond those that every case has: as in ``options.toml``, with ``default``, or with
+        ``type`` (``path``, ``texts``, ``count``) and, where it must be given, ``required``.
     names : mapping of str to str
         Arguments of the work that an option of another name gives.
     seeded : bool
@@ -67,7 +64,7 @@ class PublishedCase:
     columns: tuple[str, ...] = ()
     table: str | None = None
     page: str = ""
-    options: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=lambda: {"folder": "out"})
     seeded: bool = True
     prepare: Callable[[Options], None] | None = None
@@ -76,12 +73,21 @@ class PublishedCase:
 
     def signature(self) -> dict[str, tuple[object, object]]:
         """Return its options: name to annotation and default."""
-        common: dict[str, tuple[Any, Any]] = {"as_json": (_JSON, False)}
+        common: dict[str, tuple[Any, Any]] = {"as_json": (bool, False)}
         if self.page:
-            common |= {"out": (_OUT, None), "force": (_FORCE, False), "date": (_DATE, None)}
+            common |= {
+                "out": (Path | None, None),
+                "force": (bool, False),
+                "date": (str | None, None),
+            }
         if self.seeded:
-            common["seed"] = (_SEED, 0)
-        return {**common, **self.options}
+            common["seed"] = (int, 0)
+        texts = read_table("options.toml")["case"]
+        shared = {
+            name: (annotated(name, kind, texts[name]), default)
+            for name, (kind, default) in common.items()
+        }
+        return shared | {name: _own_option(name, entry) for name, entry in self.options.items()}
 
     @property
     def published(self) -> Published | None:
@@ -102,6 +108,28 @@ class PublishedCase:
         return called(*arguments, **given)
 
 
+def _own_option(name: str, entry: Mapping[str, Any]) -> tuple[object, object]:
+    """Return annotation and default of an option that a case states itself."""
+    if "default" in entry:
+        return annotated(name, type(entry["default"]), entry), entry["default"]
+    kind = _TYPES[entry["type"]]
+    if entry.get("required"):
+        return annotated(name, kind, entry), ...
+    return annotated(name, kind | None, entry), None
+
+
+def read_cases(
+    table: Mapping[str, Mapping[str, Any]], steps: Mapping[str, Mapping[str, Callable[..., None]]]
+) -> tuple[PublishedCase, ...]:
+    """Return the cases of a table, each with its steps: ``prepare``, ``show``, ``finish``."""
+    cases = []
+    for name, entry in table.items():
+        fields: dict[str, Any] = {**entry, **steps.get(name, {})}
+        fields["columns"] = tuple(fields.get("columns", ()))
+        cases.append(PublishedCase(name, **fields))
+    return tuple(cases)
+
+
 def add_command(app: typer.Typer, case: PublishedCase) -> None:
     """Add a case's command, its options made from its record."""
 
@@ -109,7 +137,7 @@ def add_command(app: typer.Typer, case: PublishedCase) -> None:
         return _run(case, options)
 
     options = case.signature()
-    annotations = with_metavars({name: annotation for name, (annotation, _) in options.items()})
+    annotations = {name: annotation for name, (annotation, _) in options.items()}
     kind = inspect.Parameter.KEYWORD_ONLY
     command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [
