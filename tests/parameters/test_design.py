@@ -6,6 +6,10 @@ import pytest
 
 from elevon import Actuator, simulate
 from elevon.errors import InputError, RangeError, UnitError, UnknownNameError
+from elevon.parameters import records
+from elevon.parameters.design import quantities
+from elevon.parameters.design.formula import evaluate
+from elevon.parameters.design.rule import TERMS, rules
 
 MINE = {"supply": "28 V", "power": "50 W", "lead": "2 mm", "gear": 4, "encoder": 1024}
 JOINT = {"supply": "48 V", "torque": "49 N m", "speed": "25 rpm", "gear": 100}
@@ -152,3 +156,24 @@ def test_a_neutral_base_alone_is_not_complete(tmp_path):
     path.write_text('base = "torino-rotary"\n[design]\nsupply = "28 V"\n')
     with pytest.raises(InputError, match="has no neutral base"):
         Actuator.load(path)
+
+
+@pytest.mark.parametrize("wiring", ["ballscrew", "rotary"])
+def test_formulas_name_what_a_design_or_an_actuator_has(wiring):
+    known = {*quantities(wiring), *records(wiring), *TERMS, "current"}
+    for name, rows in rules().items():
+        for rule in (row for row in rows if row.form in {"", wiring}):
+            names = []
+            evaluate(rule.value, lambda each, names=names: names.append(each) or 1.0)
+            own = (
+                {"thrust", "torque"}
+                if rule.given and rule.given[-1] in {"thrust", "torque"}
+                else set()
+            )
+            assert {*names} <= known | own, (name, rule.name)
+
+
+@pytest.mark.parametrize("formula", ["open('x')", "a if b else c", "a[0]", "'text'", "a % b"])
+def test_a_formula_holds_arithmetic_alone(formula):
+    with pytest.raises(ValueError, match="no place in a formula"):
+        evaluate(formula, lambda _: 1.0)

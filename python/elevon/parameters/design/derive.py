@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 from elevon.errors import InputError
 from elevon.parameters.design.quantities import LINEAR, Given, quantities
-from elevon.parameters.design.rule import Rule
-from elevon.parameters.design.rules import RULES
+from elevon.parameters.design.rule import Rule, rules
 from elevon.parameters.parameter import Parameter
 from elevon.parameters.records import records
 
@@ -61,8 +60,8 @@ class Values:
 
     def rule(self, name: str) -> Rule | None:
         """Return the rule that derives a number here."""
-        rules = (rule for rule in RULES.get(name, ()) if rule.form in ("", self.wiring))
-        return next((rule for rule in rules if all(self.has(each) for each in rule.given)), None)
+        known = (rule for rule in rules().get(name, ()) if rule.form in ("", self.wiring))
+        return next((rule for rule in known if all(self.has(each) for each in rule.given)), None)
 
     def _derive(self, name: str) -> Parameter:
         rule = self.rule(name)

@@ -7,10 +7,14 @@ the model. A rule that rests on a number nobody gave says so in its text (ASSUME
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import cache
+from importlib.resources import files
+from typing import Protocol
 
+from elevon.parameters.design.formula import evaluate
 from elevon.parameters.relations import copper_loss, torque_constant
 
 ROOT3 = math.sqrt(3.0)
@@ -38,37 +42,6 @@ class DesignNumbers(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Rule:
-    """One rule.
-
-    Attributes
-    ----------
-    name : str
-        Printed as the source of what it derives.
-    work : callable
-        From the numbers to the SI value.
-    text : str
-        The formula in words, and what is assumed.
-    given : tuple of str
-        DesignNumbers of the design that must be given for it to serve.
-    form : str
-        The wiring it is for; empty: each.
-    unit : str
-        In which the value is printed.
-    assumed : bool
-        The value itself is assumed.
-    """
-
-    name: str
-    work: Callable[[Any], float]
-    text: str
-    given: tuple[str, ...] = ()
-    form: str = ""
-    unit: str = ""
-    assumed: bool = False
-
-
 def turns_per_output(v: DesignNumbers) -> float:
     """Return motor radians per radian or metre of the output."""
     return v("gear.ratio") * (2.0 * math.pi / v("lead") if v.linear else 1.0)
@@ -90,7 +63,7 @@ def phase_emf(v: DesignNumbers) -> float:
     return v("motor.torque_constant") * share[v.word("motor.kind", "brushless")]
 
 
-def peak_current(v: DesignNumbers, name: str) -> float:
+def phase_current(v: DesignNumbers, name: str) -> float:
     """Return the phase current, peak, whose torque a data sheet's current gives."""
     return v("motor.torque_constant") * v(name) / torque_constant(v("motor.emf_constant"))
 
@@ -135,3 +108,75 @@ def supply_speed(v: DesignNumbers) -> float:
 def power_of_load(v: DesignNumbers) -> float:
     """Return the power [W] at the motor's shaft that a given load at its speed takes."""
     return v(load_name(v)) * v("speed") / (_RESERVE * v("efficiency"))
+
+
+#: What a formula may name besides the numbers of a design and the paths of parameters.
+TERMS: Mapping[str, Callable[[DesignNumbers], float]] = {
+    "pi": lambda _: math.pi,
+    "degree": lambda _: math.radians(1.0),
+    "motor_efficiency": lambda _: MOTOR_EFFICIENCY,
+    "rise": lambda _: RISE,
+    "travel_per_radian": lambda v: v("lead") / (2 * math.pi) if v.linear else 1.0,
+    "link_share": lambda v: ROOT3 / 1.5 if v.word("motor.kind", "") == "dc" else 1.0,
+    "usual_pole_pairs": lambda v: 1.0 if v.word("motor.kind", "") == "dc" else 4.0,
+    "load": lambda v: v(load_name(v)),
+    "rated_current": lambda v: phase_current(v, "motor.current"),
+    "peak_current": lambda v: phase_current(v, "motor.peak_current"),
+    "torque_constant": lambda v: torque_constant(v("motor.emf_constant")),
+    "turns_per_output": turns_per_output,
+    "phase_share": phase_share,
+    "phase_emf": phase_emf,
+    "phase_voltage": phase_voltage,
+    "total_inertia": total_inertia,
+    "rated_voltage": rated_voltage,
+    "rated_heat": rated_heat,
+    "useful": useful,
+    "load_efficiency": load_efficiency,
+    "supply_speed": supply_speed,
+    "power_of_load": power_of_load,
+}
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule, as `rules.toml` states it.
+
+    Attributes
+    ----------
+    name : str
+        Printed as the source of what it derives.
+    value : str
+        Its formula, see `elevon.parameters.design.formula`.
+    text : str
+        The formula in words, and what is assumed.
+    given : tuple of str
+        DesignNumbers of the design that must be given for it to serve.
+    form : str
+        The wiring it is for; empty: each.
+    unit : str
+        In which the value is printed.
+    assumed : bool
+        The value itself is assumed.
+    """
+
+    name: str
+    value: str
+    text: str
+    given: tuple[str, ...] = ()
+    form: str = ""
+    unit: str = ""
+    assumed: bool = False
+
+    def work(self, v: DesignNumbers) -> float:
+        """Return the SI value."""
+        return evaluate(self.value, lambda name: TERMS[name](v) if name in TERMS else v(name))
+
+
+@cache
+def rules() -> Mapping[str, tuple[Rule, ...]]:
+    """Return the rules by the number of a design or the path of the parameter that they derive."""
+    table = tomllib.loads((files("elevon.parameters.design") / "rules.toml").read_text("utf-8"))
+    return {
+        name: tuple(Rule(**{**row, "given": tuple(row.get("given", ()))}) for row in rows)
+        for name, rows in table.items()
+    }
