@@ -24,22 +24,23 @@ def moving():
 def test_a_bad_number_is_fitted_and_the_errors_fall():
     actuator = elevon.Actuator.load("torino-rotary").with_values({"low.band_ratio": 0.95})
     fit = fit_low(actuator, [FitCase("moving", moving())])
-    assert fit.old == {"low.band_ratio": 0.95}
-    assert fit.new["low.band_ratio"] < 0.8
-    assert "low.voltage_ratio" in fit.unchanged
+    (number,) = fit.fitted
+    assert (number.path, number.old) == ("low.band_ratio", 0.95)
+    assert number.new < 0.8
+    assert "low.voltage_ratio" in dict(fit.unchanged)
     before, after = (
-        sum(value**2 for row in rows for value in row.values())
-        for rows in (fit.errors_before, fit.errors_after)
+        sum(value**2 for errors in rows for value in errors.values())
+        for rows in ([case.before for case in fit.cases], [case.after for case in fit.cases])
     )
     assert after < 0.9 * before
-    assert np.isnan(fit.deviation["low.band_ratio"])
+    assert np.isnan(number.deviation)
 
 
 def test_the_pwm_drive_has_no_band():
     actuator = elevon.Actuator.load("torino-rotary").with_values({"drive.kind": "pwm"})
     fit = fit_low(actuator, [FitCase("moving", moving())])
-    assert not fit.new
-    assert fit.unchanged["low.band_ratio"] == "no case depends on it with this drive"
+    assert not fit.fitted
+    assert dict(fit.unchanged)["low.band_ratio"] == "no case depends on it with this drive"
 
 
 def test_refusals():

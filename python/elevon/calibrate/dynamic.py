@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,7 @@ from elevon.estimate.free import inner, outer
 from elevon.estimate.lanes import Lanes
 from elevon.logs.log import Log
 from elevon.parameters.relations import constant_is_tied, static_following
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 
 Bools = npt.NDArray[np.bool_]
@@ -32,8 +34,24 @@ _EXPLAINED = 0.5  # share of the current's variance the first values must explai
 _KEEP = 3  # starts that go on
 
 
+class Absorbed(NamedTuple):
+    """A parameter that absorbs what the model lacks: its value by the model runs, and directly."""
+
+    path: str
+    simulation: float
+    direct: float
+
+
+class RunErrors(NamedTuple):
+    """RMS of speed [rad/s] and current [A] of the fitted model runs of a log."""
+
+    log: str
+    speed: float
+    current: float
+
+
 @dataclass(frozen=True)
-class Dynamic:
+class Dynamic(Plain):
     """Result of the stage.
 
     Attributes
@@ -56,40 +74,33 @@ class Dynamic:
         Parameters that ended at a bound.
     drive : str
         Kind of drive whose model explains the logs better.
-    absorbed : tuple of (str, float, float)
-        Parameter, value of the model runs, direct value: where they part, the parameter absorbs
-        what the model lacks.
-    rms : tuple of (str, float, float)
-        Log, RMS of speed [rad/s] and current [A] of the fitted model runs.
+    absorbed : tuple of Absorbed
+        Where model runs and direct estimate part.
+    rms : tuple of RunErrors
+        Of each log.
     runs : int
         Model runs.
     """
 
-    ranking: Identifiability
-    free: tuple[Free, ...]
-    x: Floats
-    covariance: Floats
-    degrees: float
+    ranking: Annotated[Identifiability, WORKING]
+    free: Annotated[tuple[Free, ...], WORKING]
+    x: Annotated[Floats, WORKING]
+    covariance: Annotated[Floats, WORKING]
+    degrees: Annotated[float, WORKING]
     cost: float
     converged: bool
     at_bound: tuple[str, ...]
     drive: str
-    absorbed: tuple[tuple[str, float, float], ...]
-    rms: tuple[tuple[str, float, float], ...]
+    absorbed: tuple[Absorbed, ...]
+    rms: tuple[RunErrors, ...]
     runs: int
 
-    def to_dict(self) -> dict[str, object]:
-        """Return it as plain types."""
-        return {
-            "drive": self.drive,
-            "values": outer(self.free, self.x),
-            "cost": self.cost,
-            "converged": self.converged,
-            "at_bound": list(self.at_bound),
-            "runs": self.runs,
-            "absorbed": [{"path": p, "simulation": a, "direct": b} for p, a, b in self.absorbed],
-            "rms": [{"log": n, "speed": s, "current": c} for n, s, c in self.rms],
-        }
+    COMPUTED: ClassVar = ("values",)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """What was fitted, in its own units."""
+        return outer(self.free, self.x)
 
     def estimates(
         self, actuator: Actuator, known: Sequence[str], free: Sequence[str] | None
@@ -256,7 +267,7 @@ def _fixed(
 
 def _absorbed(
     free: Sequence[Free], x: Floats, std: Floats, known: Sequence[Estimate]
-) -> tuple[tuple[str, float, float], ...]:
+) -> tuple[Absorbed, ...]:
     direct = {item.path: item for item in known}
     absorbed = []
     for item, at, s in zip(free, map(float, x), std, strict=True):
@@ -266,19 +277,17 @@ def _absorbed(
         gap = (at - item.inner(other.value)) * item.spread
         noise = float(np.hypot(s * item.spread, other.std / other.value))
         if abs(gap) > _ABSORBS and abs(gap) > _SIGMAS * noise:
-            absorbed.append((item.path, item.outer(at), other.value))
-    return tuple(sorted(absorbed, key=lambda row: -abs(np.log(row[1] / row[2]))))
+            absorbed.append(Absorbed(item.path, item.outer(at), other.value))
+    return tuple(sorted(absorbed, key=lambda row: -abs(np.log(row.simulation / row.direct))))
 
 
-def _rms(
-    problem: SpeedRuns, lanes: Lanes, residual: Floats
-) -> tuple[tuple[str, float, float], ...]:
+def _rms(problem: SpeedRuns, lanes: Lanes, residual: Floats) -> tuple[RunErrors, ...]:
     """RMS errors of speed and current, log by log."""
     sizes = [
         scale * float(np.sqrt(np.mean(residual[place] ** 2)))
         for place, scale in zip(lanes.slices, lanes.scales, strict=True)
     ]
     return tuple(
-        (log.name, *pair)
+        RunErrors(log.name, *pair)
         for log, pair in zip(problem.logs, zip(sizes[::2], sizes[1::2], strict=True), strict=True)
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from elevon.logs.command.guess import FREE
 from elevon.logs.command.known import NotedCommand, align_noted, noted_values
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.log import Log, per_log
+from elevon.plain import REMAINDER, WORKING, Plain, key
 from elevon.waveforms import evaluate
 
 #: Paths that come from positions alone, not from the dynamic fit.
@@ -40,7 +42,7 @@ _SMALL = 0.02  # RMS of the command's misfit over its spread, above which no wav
 
 
 @dataclass(frozen=True)
-class CommandFit:
+class CommandFit(Plain):
     """Waveform of a log's command with the position gain fitted along.
 
     Attributes
@@ -62,30 +64,23 @@ class CommandFit:
     """
 
     log: str
-    waveform: WaveformFit
-    gain: float
-    gain_std: float
-    amplitude: float
-    amplitude_std: float
-    factor: float | None
-    reach: float
-    values: Floats = field(repr=False, compare=False)
+    waveform: Annotated[WaveformFit, REMAINDER]
+    gain: Annotated[float, key("position_gain")]
+    gain_std: Annotated[float, key("position_gain_std")]
+    amplitude: Annotated[float, WORKING]
+    amplitude_std: Annotated[float, WORKING]
+    factor: Annotated[float | None, key("amplitude_factor")]
+    reach: Annotated[float, WORKING]
+    values: Annotated[Floats, WORKING] = field(repr=False, compare=False)
 
-    def to_dict(self) -> dict[str, object]:
-        """Return it as plain types."""
-        return {
-            "log": self.log,
-            "waveform": self.waveform.kind,
-            "values": dict(self.waveform.values),
-            "std": dict(self.waveform.std),
-            "rms": self.waveform.rms,
-            "position_gain": self.gain,
-            "position_gain_std": self.gain_std,
-            "amplitude_factor": self.factor,
-            "amplitude_factor_std": None
-            if self.factor is None
-            else abs(self.factor) * self.amplitude_std / max(abs(self.amplitude), 1e-300),
-        }
+    COMPUTED: ClassVar = ("amplitude_factor_std",)
+
+    @property
+    def amplitude_factor_std(self) -> float | None:
+        """Standard deviation of the factor."""
+        if self.factor is None:
+            return None
+        return abs(self.factor) * self.amplitude_std / max(abs(self.amplitude), 1e-300)
 
 
 @per_log

@@ -87,11 +87,11 @@ def _guess(
         "map": str(target),
         "gear_ratio": guess.gear_ratio,
         "travel_per_turn_m": guess.travel_per_turn,
-        "columns": [item.to_dict() for item in guess.columns],
+        "columns": guess.columns,
     }
 
     def show() -> None:
-        rows = [(c.name, c.role or "?", c.unit, "; ".join(c.reasons)) for c in guess.columns]
+        rows = [(c.name, c.role or "?", c.unit or "", "; ".join(c.reasons)) for c in guess.columns]
         print_table(("column", "role", "unit", "why"), rows, title=f"{logs[0]} -> {target}")
 
     return Answer(data, show)

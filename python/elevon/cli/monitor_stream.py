@@ -73,9 +73,8 @@ def _parts(source: IO[bytes], reader: StreamReader) -> Iterator[StreamPart]:
 def _take(part: StreamPart, reader: StreamReader, watch: Monitor) -> bool:
     """Feed what some lines say; return whether a window became whole."""
     watch.heading = reader.heading
-    for text in reader.notes:
+    for text in part.notes:
         say(text)
-    reader.notes.clear()
     if part.unreadable:
         watch.leave_out(part.unreadable)
         say(f"{part.why}; {part.unreadable} lines left out")

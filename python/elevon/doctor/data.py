@@ -70,7 +70,7 @@ def columns_of(name: str, log: ForeignLog) -> list[ReadColumn]:
     """Return what each column of a log was taken for; with a guess, why."""
     if log.guess is not None:
         return [
-            ReadColumn(name, c.name, c.role, c.unit, "; ".join(c.reasons))
+            ReadColumn(name, c.name, c.role or "", c.unit or "", "; ".join(c.reasons))
             for c in log.guess.columns
         ]
     roles = {signal: role for role, signal in log.imported.recording.roles.items()}

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from elevon.calibrate.door import validate
 from elevon.calibrate.validation import TRANSIENT, Validation
 from elevon.diagnose.door import diagnose
-from elevon.diagnose.engine.answer import Diagnosis
 from elevon.doctor.answer import Examination
 from elevon.doctor.data import checks_of, columns_of
 from elevon.errors import InputError
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.simulate.arguments import ActuatorLike
 
+T = TypeVar("T")
 PathLike = str | os.PathLike[str]
 _SETTLES = 0.25  # share of a log that is left out where no actuator file states a transient
 
@@ -78,9 +78,8 @@ def doctor(
     read = _read([*given, *healthy], column_map, loadcells, notes)
     named = named_apart([item.imported for item in read])
     unit, reference = named[: len(given)], named[len(given) :]
-    reasons: dict[str, str] = {}
-    fit = _fit(unit, reference, model, reasons, part(progress, 0.0, 0.4))
-    verdict = _verdict(unit, reference, model, reasons, false_alarm)
+    fit, no_fit = _tried(lambda: _fit([*unit, *reference], model, part(progress, 0.0, 0.4)))
+    verdict, no_verdict = _tried(lambda: diagnose(unit, model, reference, false_alarm=false_alarm))
     if progress is not None:
         progress(1.0)
     guessed = next((item.guess for item in read if item.guess is not None), None)
@@ -96,7 +95,7 @@ def doctor(
         ),
         fit,
         verdict,
-        reasons,
+        {name: why for name, why in (("fit", no_fit), ("verdict", no_verdict)) if why},
         "" if guessed is None else guess_text(guessed),
         {log.name: log.recording for log in named if log.recording is not None},
     )
@@ -138,34 +137,17 @@ def _path(given: PathLike | None) -> Path | None:
     return None if given is None else Path(given)
 
 
-def _fit(
-    logs: Sequence[Log],
-    healthy: Sequence[Log],
-    actuator: Actuator,
-    reasons: dict[str, str],
-    progress: Progress | None,
-) -> Validation | None:
-    """Hold the model against all logs; why it cannot be goes into `reasons`."""
-    both = [*logs, *healthy]
+def _tried(work: Callable[[], T]) -> tuple[T | None, str]:
+    """Return an answer, or None and why there is none."""
+    try:
+        return work(), ""
+    except InputError as error:
+        return None, str(error)
+
+
+def _fit(logs: Sequence[Log], actuator: Actuator, progress: Progress | None) -> Validation:
+    """Hold the model against logs, with less left out of short ones where the file is silent."""
     stated = "transient" in (actuator.validation or {})
-    shortest = min(log.duration for log in both)
+    shortest = min(log.duration for log in logs)
     transient = None if stated else min(TRANSIENT, _SETTLES * shortest)
-    try:
-        return validate(both, actuator, transient=transient, progress=progress)
-    except InputError as error:
-        reasons["fit"] = str(error)
-        return None
-
-
-def _verdict(
-    logs: Sequence[Log],
-    healthy: Sequence[Log],
-    actuator: Actuator,
-    reasons: dict[str, str],
-    false_alarm: float,
-) -> Diagnosis | None:
-    try:
-        return diagnose(logs, actuator, healthy, false_alarm=false_alarm)
-    except InputError as error:
-        reasons["verdict"] = str(error)
-        return None
+    return validate(logs, actuator, transient=transient, progress=progress)

@@ -44,12 +44,15 @@ class StreamPart:
         What is wrong with the first of those.
     new_day : bool
         Whether a day ends behind them.
+    notes : tuple of str
+        What the caller should know of the stream so far, each once.
     """
 
     samples: Mapping[str, FloatArray]
     unreadable: int = 0
     why: str = ""
     new_day: bool = False
+    notes: tuple[str, ...] = ()
 
 
 class StreamReader:
@@ -68,11 +71,6 @@ class StreamReader:
     factors : mapping of str to float
         From columns to SI, for positions whose unit neither header nor map states: a stream cannot
         settle it, a log of the same columns has.
-
-    Attributes
-    ----------
-    notes : list of str
-        What the caller should know; whoever says it takes it away.
     """
 
     def __init__(
@@ -82,7 +80,6 @@ class StreamReader:
         factors: Mapping[str, float] | None = None,
     ) -> None:
         self._map, self._note, self._factors = column_map, note, factors or {}
-        self.notes: list[str] = []
         self._cut_off = b""
         self._number = 0
         self._in_a_row = 0
@@ -144,8 +141,10 @@ class StreamReader:
 
     def _opened(self, text: str) -> _Json | _Table:
         if text.lstrip().startswith("{"):
-            return _Json(self.notes)
-        return _Table(text, self._number, self._text, self)
+            return _Json()
+        names = self._text.begin(text, self._number, None)
+        assigned, notes = self._assigned(names)
+        return _Table(text, names, self._text, assigned, notes)
 
     def _part(self, batch: Sequence[tuple[int, str]], *, new_day: bool = False) -> StreamPart:
         assert self._format is not None
@@ -163,16 +162,11 @@ class StreamReader:
                     raise
         self._begun = self._begun or bool(rows)
         samples = self._format.samples(rows)
-        return StreamPart(samples, len(wrong), wrong[0] if wrong else "", new_day)
+        why = wrong[0] if wrong else ""
+        return StreamPart(samples, len(wrong), why, new_day, self._format.new_notes())
 
-    def assigned(self, names: Sequence[str]) -> dict[str, Assignment]:
-        """Return what the columns of a header are, each with its factor.
-
-        Raises
-        ------
-        InputError
-            A position whose unit nobody states; as `assign_columns`.
-        """
+    def _assigned(self, names: Sequence[str]) -> tuple[dict[str, Assignment], list[str]]:
+        """Return what the columns of a header are, each with its factor, and what to know."""
         columns, units = named_columns(list(names), np.zeros((0, len(names))))
         table = RawTable(SOURCE, columns, units)
         report = ImportReport(SOURCE, "csv")
@@ -182,8 +176,7 @@ class StreamReader:
             if item.factor is None:
                 item.factor = self._settled(item)
         settle_currents(assigned, self._map, self._note, report)
-        self.notes += [f"{f.place}: {f.text}" for f in report.findings]
-        return assigned
+        return assigned, [f"{f.place}: {f.text}" for f in report.findings]
 
     def _settled(self, item: Assignment) -> float:
         factor = self._factors.get(item.column)
@@ -196,15 +189,33 @@ class StreamReader:
         return factor
 
 
-class _Table:
+class _Lines:
+    """Lines of one format; what they show is noted once."""
+
+    def __init__(self, heading: str, notes: Sequence[str] = ()) -> None:
+        self.heading = heading
+        self._notes = list(notes)
+
+    def new_notes(self) -> tuple[str, ...]:
+        """Return what was noted since this was asked last."""
+        notes, self._notes = self._notes, []
+        return tuple(notes)
+
+
+class _Table(_Lines):
     """Lines of a CSV."""
 
-    def __init__(self, text: str, number: int, lines: LineReader, reader: StreamReader) -> None:
-        self._lines = lines
-        self._names = lines.begin(text, number, None)
-        self.heading = text
+    def __init__(
+        self,
+        heading: str,
+        names: Sequence[str],
+        lines: LineReader,
+        assigned: Mapping[str, Assignment],
+        notes: Sequence[str],
+    ) -> None:
+        super().__init__(heading, notes)
+        self._lines, self._names, self._assigned = lines, list(names), assigned
         self._bare = bool(lines.drain())  # without a header: its first line is a row
-        self._assigned = reader.assigned(self._names)
         labels = list(named_columns(self._names, np.zeros((0, len(self._names))))[0])
         self._time = labels.index(self._assigned["time"].column)
         self._seconds = self._assigned["time"].factor or 1.0
@@ -238,14 +249,12 @@ class _Table:
         return out
 
 
-class _Json:
+class _Json(_Lines):
     """Lines of JSON objects."""
 
-    heading = "{"
-
-    def __init__(self, notes: list[str]) -> None:
+    def __init__(self) -> None:
+        super().__init__("{")
         self._keys: tuple[str, ...] = ()
-        self._notes = notes
         self._extra: set[str] = set()
 
     def ends_day(self, text: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
 from elevon.lowfit.cases import FitCase
 from elevon.parameters.records import records
+from elevon.plain import WORKING, Plain, key
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 
@@ -31,58 +32,74 @@ SEEN = 1e-4
 """Smallest change of a signal over its size, for `PROBE`, that determines a number."""
 
 
+class FittedNumber(NamedTuple):
+    """A number that was fitted [SI]; `deviation` over the cases, by leaving out one at a time."""
+
+    path: str
+    old: float
+    new: float
+    deviation: float
+
+
+class UnfittedNumber(NamedTuple):
+    """A number that is left as it was, and why."""
+
+    path: str
+    reason: str
+
+
+class CaseErrors(NamedTuple):
+    """Of a case, RMS of low less high over the size of high, by signal, before and after."""
+
+    name: str
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+
+
 @dataclass(frozen=True)
-class LowFit:
+class LowFit(Plain):
     """What was fitted, and how far the reduced-order model was and is from the switching one.
 
     Attributes
     ----------
     before, actuator : Actuator
         As given; with the fitted numbers.
-    cases : tuple of FitCase
-        Over which the fit ran.
-    old, new : mapping of str to float
-        Value of every number that was fitted [SI].
-    deviation : mapping of str to float
-        Standard deviation of each over the cases, by leaving out one at a time (jackknife) [SI].
-    unchanged : mapping of str to str
-        Numbers left as they were, and why.
-    errors_before, errors_after : tuple of mapping of str to float
-        For each case, RMS of the difference over the switching one's size, by signal: RMS, of the
-        position about its mean.
+    fitted : tuple of FittedNumber
+        What the cases determine.
+    unchanged : tuple of UnfittedNumber
+        What they do not.
+    cases : tuple of CaseErrors
+        Over which the fit ran; the size of a position is its RMS about its mean.
     """
 
-    before: Actuator
-    actuator: Actuator
-    cases: tuple[FitCase, ...]
-    old: Mapping[str, float]
-    new: Mapping[str, float]
-    deviation: Mapping[str, float]
-    unchanged: Mapping[str, str]
-    errors_before: tuple[Mapping[str, float], ...]
-    errors_after: tuple[Mapping[str, float], ...]
+    before: Annotated[Actuator, WORKING]
+    actuator: Annotated[Actuator, WORKING]
+    fitted: tuple[FittedNumber, ...]
+    unchanged: Annotated[tuple[UnfittedNumber, ...], key("kept")]
+    cases: tuple[CaseErrors, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the command."""
-        return {
-            "status": "ok",
-            "actuator": self.before.name,
-            "drive": self.before.parameters["drive.kind"].value,
-            "fitted": [
-                {"path": path, "old": self.old[path], "new": value,
-                 "deviation": self.deviation[path]}
-                for path, value in self.new.items()
-            ],
-            "kept": [{"path": path, "reason": reason} for path, reason in self.unchanged.items()],
-            "cases": [
-                {"name": case.name, "before": dict(old), "after": dict(new)}
-                for case, old, new in zip(
-                    self.cases, self.errors_before, self.errors_after, strict=True
-                )
-            ],
-            "rms_before": _total(self.errors_before),
-            "rms_after": _total(self.errors_after),
-        }  # fmt: skip
+    COMPUTED: ClassVar = ("status", "actuator=name", "drive", "rms_before", "rms_after")
+    status: ClassVar = "ok"
+
+    @property
+    def name(self) -> str:
+        """Of the actuator."""
+        return self.before.name
+
+    @property
+    def drive(self) -> str:
+        """Kind of drive that the numbers belong to."""
+        return str(self.before.parameters["drive.kind"].value)
+
+    @property
+    def rms_before(self) -> dict[str, float]:
+        """RMS of the errors over the cases, by signal."""
+        return _total([case.before for case in self.cases])
+
+    @property
+    def rms_after(self) -> dict[str, float]:
+        """The same with the fitted numbers."""
+        return _total([case.after for case in self.cases])
 
 
 def fit_low(
@@ -135,12 +152,17 @@ def _fitted(
     problem = _Problem(actuator, tuple(cases), tuple(high), seed)
     seen, unchanged = problem.split(free)
     old = {path: float(actuator.parameters.value(path)) for path in seen}
-    rows = range(len(cases))
-    new = problem.solve(seen, rows)
+    new = problem.solve(seen, range(len(cases)))
     deviation = problem.jackknife(seen, new, progress)
     after = actuator.with_values(new, source="fitted to the switching model", request=False)
-    errors = [problem.errors(values) for values in (old, new)]
-    return LowFit(actuator, after, tuple(cases), old, new, deviation, unchanged, *errors)
+    errors = zip(cases, problem.errors(old), problem.errors(new), strict=True)
+    return LowFit(
+        actuator,
+        after,
+        tuple(FittedNumber(path, old[path], new[path], deviation[path]) for path in seen),
+        tuple(UnfittedNumber(path, reason) for path, reason in unchanged.items()),
+        tuple(CaseErrors(case.name, *both) for case, *both in errors),
+    )
 
 
 @dataclass(frozen=True)

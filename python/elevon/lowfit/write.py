@@ -14,14 +14,12 @@ from elevon.parameters.write import write_set
 def fitted_parameters(fit: LowFit) -> list[Parameter]:
     """Return one entry for each fitted number: source, old value, deviation over the cases."""
     names = "; ".join(case.name for case in fit.cases)
-    drive = fit.before.parameters["drive.kind"].value
     entries = []
-    for path, value in fit.new.items():
-        spread = fit.deviation[path]
-        note = f"For drive.kind = {drive}. Standard deviation over the cases {spread:.2g}."
+    for path, old, new, spread in fit.fitted:
+        note = f"For drive.kind = {fit.drive}. Standard deviation over the cases {spread:.2g}."
         source = f"fitted to the switching model over {len(fit.cases)} cases: {names}"
-        rounded = float(f"{value:.4g}")
-        entries.append(Parameter(path, rounded, "", source, note, "calibrated", fit.old[path]))
+        rounded = float(f"{new:.4g}")
+        entries.append(Parameter(path, rounded, "", source, note, "calibrated", old))
     return entries
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from elevon.estimate.covariance import robust_covariance
 from elevon.estimate.residual import ResidualFit, fit_residual
 from elevon.logs.command.guess import FREE, guesses
 from elevon.logs.command.reconstruct import CommandTrace
+from elevon.plain import WORKING, Plain, key
 from elevon.waveforms import evaluate, wave_records
 
 FloatArray = npt.NDArray[np.float64]
@@ -29,7 +31,7 @@ _SCORED = 2000  # samples enough to tell the kinds apart
 
 
 @dataclass(frozen=True, slots=True)
-class WaveformFit:
+class WaveformFit(Plain):
     """A fitted command.
 
     All standard deviations hold for coloured residuals, and include the unknown instant at which
@@ -58,15 +60,15 @@ class WaveformFit:
         Whether the optimiser met its tolerance.
     """
 
-    kind: str
+    kind: Annotated[str, key("waveform")]
     values: dict[str, float]
     std: dict[str, float]
-    covariance: FloatArray
+    covariance: Annotated[FloatArray, WORKING]
     rms: float
-    samples: int
-    window: tuple[float, float]
-    converged: bool
-    outliers: int = 0
+    samples: Annotated[int, WORKING]
+    window: Annotated[tuple[float, float], WORKING]
+    converged: Annotated[bool, WORKING]
+    outliers: Annotated[int, WORKING] = 0
 
     def at(self, time: npt.ArrayLike) -> FloatArray:
         """Return the fitted command [rad] at instants [s]."""

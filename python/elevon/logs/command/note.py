@@ -15,13 +15,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from elevon.documents import Document, check_depth, validated
 from elevon.errors import FormatError, InputError, did_you_mean, quoted
 from elevon.files import read_regular
 from elevon.logs.command.guess import FREE
 from elevon.logs.formats.limits import Limits, existing_file
+from elevon.plain import WORKING, Plain
 from elevon.scenario.bare import check_units
 from elevon.scenario.scenario import Command, Scenario
 from elevon.units import ambiguous, is_ambiguous, parse_quantity, si_unit
@@ -57,8 +58,8 @@ _SUFFIX = re.compile(r"_(?:deg|degrees|hz|s|sec|seconds|m|deg_s|deg_per_s)$")
 _BRAKE = {"on": True, "true": True, "yes": True, "off": False, "false": False, "no": False}
 
 
-@dataclass(frozen=True, slots=True)
-class CommandNote:
+@dataclass(frozen=True)
+class CommandNote(Plain):
     """A command note in SI.
 
     Attributes
@@ -85,45 +86,29 @@ class CommandNote:
         Motor over output; of a log in the bench's format, whose columns do not say it.
     """
 
-    source: str
+    source: Annotated[str, WORKING] = ""
     waveform: str | None = None
     parameters: dict[str, float] = field(default_factory=dict)
     brake: bool | None = None
     load_cell_arm: float | None = None
     chain_ratio: float | None = None
     current: str | None = None
-    ignored: tuple[str, ...] = ()
-    command: Command | None = None
+    ignored: Annotated[tuple[str, ...], WORKING] = ()
+    command: Annotated[Command | None, WORKING] = None
     gear_ratio: float | None = None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, *, stored: bool = True) -> dict[str, Any]:
         """Return it as plain types for a recording's metadata."""
-        return {
-            "waveform": self.waveform,
-            "parameters": dict(self.parameters),
-            "brake": self.brake,
-            "load_cell_arm": self.load_cell_arm,
-            "chain_ratio": self.chain_ratio,
-            "gear_ratio": self.gear_ratio,
-            "current": self.current,
-            "command": None if self.command is None else _plain(self.command),
-        }
+        command = None if self.command is None else _plain(self.command)
+        return super().to_dict(stored=stored) | {"command": command}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], source: str) -> CommandNote:
+    def from_dict(cls, data: Mapping[str, Any], place: str = "") -> CommandNote:
         """Return the note that `to_dict` wrote, from a recording's metadata."""
+        note = super().from_dict({key: data[key] for key in data if key != "command"}, place)
         command = data.get("command")
-        return cls(
-            source,
-            waveform=data.get("waveform"),
-            parameters=dict(data.get("parameters") or {}),
-            brake=data.get("brake"),
-            load_cell_arm=data.get("load_cell_arm"),
-            chain_ratio=data.get("chain_ratio"),
-            gear_ratio=data.get("gear_ratio"),
-            current=data.get("current"),
-            command=None if command is None else _command(command, source, None),
-        )
+        full = None if command is None else _command(command, place, None)
+        return replace(note, source=place, command=full)
 
     @classmethod
     def of_scenario(cls, scenario: Scenario, source: str) -> CommandNote:

@@ -67,7 +67,7 @@ def guess_map(table: RawTable) -> Guess:
         No column that could be the time.
     """
     columns = {
-        name: GuessedColumn(name, unit=unit_hint(name, table.units.get(name, "")))
+        name: GuessedColumn(name, unit=unit_hint(name, table.units.get(name, "")) or None)
         for name in table.columns
     }
     time = _time(table, columns)
@@ -148,7 +148,7 @@ def _drop_odd_unit(item: GuessedColumn) -> None:
         units = (*units, *known_roles()["output_speed"].units)
     if all(parse_unit(unit).dimension != dimension for unit in units):
         item.reasons.append(f"not in {item.unit}, which its header suggests")
-        item.unit = ""
+        item.unit = None
 
 
 def _candidates(
@@ -161,21 +161,22 @@ def _candidates(
     for name, item in columns.items():
         values = table.columns[name]
         good = np.isfinite(values)
-        if item.role in moving and good.sum() > 30 and np.ptp(values[good]) > 0.0:
+        role = item.role or ""
+        if role in moving and good.sum() > 30 and np.ptp(values[good]) > 0.0:
             index = np.arange(len(values))
-            chosen[name] = (item.role, item.unit, np.interp(index, index[good], values[good]))
+            chosen[name] = (role, item.unit or "", np.interp(index, index[good], values[good]))
     return chosen
 
 
 def _apply(motion: MotionColumns, columns: Mapping[str, GuessedColumn]) -> None:
     for name in motion.swapped or ():
-        columns[name].role = ""
+        columns[name].role = None
     for name, finding in motion.findings.items():
         item = columns[name]
         if finding.role and finding.role != item.role:
             clash = next((c for c in columns.values() if c.role == finding.role), None)
             if clash is not None:
-                clash.role = ""
+                clash.role = None
             item.role = finding.role
         item.unit = finding.unit or item.unit
         item.sign = finding.sign

@@ -7,20 +7,10 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class GuessedColumn:
-    """A column: its role (empty: not known), its unit, and why."""
+    """A column: its role and its unit, where they are known, and why."""
 
     name: str
-    role: str = ""
-    unit: str = ""
+    role: str | None = None
+    unit: str | None = None
     sign: int = 1
     reasons: list[str] = field(default_factory=list)
-
-    def to_dict(self) -> dict[str, object]:
-        """Return it as plain types."""
-        return {
-            "name": self.name,
-            "role": self.role or None,
-            "unit": self.unit or None,
-            "sign": self.sign,
-            "reasons": list(self.reasons),
-        }
