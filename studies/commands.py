@@ -18,7 +18,7 @@ from elevon.cli.reproduce.case import (
     print_columns,
     read_cases,
 )
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -192,5 +192,5 @@ def _group() -> None:
     """Judge Elevon's own diagnosis and prognosis; exit code 1 when a check fails."""
 
 
-for _study in read_cases(read_table("commands.toml", "studies"), _STEPS):
+for _study in read_cases(packaged_toml("studies", "commands.toml"), _STEPS):
     add_command(app, _study)

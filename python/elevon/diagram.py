@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from functools import cache
 from html import escape
-from importlib.resources import files
 
+from elevon.data import packaged_toml
 from elevon.errors import unknown
 from elevon.plain import Plain
 
@@ -55,8 +54,8 @@ class Diagram(Plain):
 
 @cache
 def _diagrams() -> dict[str, Diagram]:
-    text = (files("elevon") / "diagrams.toml").read_text("utf-8")
-    return {name: Diagram.from_dict(data) for name, data in tomllib.loads(text).items()}
+    read = packaged_toml("elevon", "diagrams.toml")
+    return {name: Diagram.from_dict(data) for name, data in read.items()}
 
 
 def diagrams() -> list[str]:

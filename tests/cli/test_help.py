@@ -12,7 +12,7 @@ from elevon.cli import main
 from elevon.cli.help import example_of, help_rows
 from elevon.cli.output import progress_bar
 from elevon.cli.registry import COMMANDS
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 from tests.harness.registry import commands
 
 FOUND = {name: command for name, command in commands() if not name.startswith("studies")}
@@ -90,7 +90,7 @@ def test_progress_ends_at_the_whole_and_not_where_work_stopped(capsys):
 
 def test_each_text_of_an_option_belongs_to_a_parameter():
     homes = {"all_cases": "elevon.cli.reproduce.all_cases"}
-    texts = read_table("options.toml")
+    texts = packaged_toml("elevon.cli", "options.toml")
     for name in texts.keys() - {"arguments", "options", "case"}:
         module = import_module(homes.get(name, f"elevon.cli.{name}"))
         own = [f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__]

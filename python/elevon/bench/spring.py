@@ -10,30 +10,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from elevon.data import packaged_toml
 from elevon.errors import InputError, RangeError
 
-#: Preferred wire diameters of EN 10270-1 between 2 and 5 mm [m].
+#: Preferred wire diameters [m].
 STANDARD_WIRES: tuple[float, ...] = tuple(
-    round(1e-3 * d, 6)
-    for d in (
-        2.0,
-        2.1,
-        2.25,
-        2.4,
-        2.5,
-        2.6,
-        2.8,
-        3.0,
-        3.2,
-        3.4,
-        3.6,
-        3.8,
-        4.0,
-        4.25,
-        4.5,
-        4.75,
-        5.0,
-    )
+    round(1e-3 * d, 6) for d in packaged_toml("elevon.bench", "wires.toml")["diameters_mm"]
 )
 INDEX_RANGE = (4.0, 20.0)  # D / d that can be wound cold (EN 13906-2)
 

@@ -9,7 +9,7 @@ from typing import Any, get_args
 import typer
 import typer.core
 
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 
 #: Options whose text is a number with its unit.
 _QUANTITIES = frozenset((
@@ -85,7 +85,7 @@ def write_example(command: Any, ctx: Any, formatter: Any) -> None:
 def example_of(command: Any, path: str) -> str:
     """Return the example of a command by its whole path, such as ``elevon campaign run``."""
     name = path.partition(" ")[2]
-    words = read_table("commands.toml")["examples"].get(name)
+    words = packaged_toml("elevon.cli", "commands.toml")["examples"].get(name)
     if words is None and name.startswith("reproduce "):
         writes = any("--out" in item.opts for item in command.params)
         words = f"--out {name.rpartition(' ')[2]}" if writes else "--json"

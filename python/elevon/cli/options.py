@@ -16,7 +16,7 @@ import typer
 from elevon.cli import completion
 from elevon.cli.help import metavar_of, plain_type
 from elevon.cli.output import show_details
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 from elevon.errors import ElevonWarning
 
 
@@ -56,7 +56,7 @@ def declared(work: Callable[..., object]) -> dict[str, Any]:
 
 def shared_option(name: str, kind: object) -> Any:
     """Return the annotation of an option that many commands share."""
-    return annotated(name, kind, read_table("options.toml")["options"][name])
+    return annotated(name, kind, packaged_toml("elevon.cli", "options.toml")["options"][name])
 
 
 def annotated(name: str, kind: Any, entry: Mapping[str, Any], *, argument: bool = False) -> Any:
@@ -77,7 +77,7 @@ def annotated(name: str, kind: Any, entry: Mapping[str, Any], *, argument: bool 
 def _entry(work: Callable[..., object], item: inspect.Parameter) -> Mapping[str, Any]:
     """Return the entry of one parameter: the function's own, its module's, the shared one."""
     module = work.__module__.rpartition(".")[2]
-    texts = read_table("options.toml")
+    texts = packaged_toml("elevon.cli", "options.toml")
     own = texts.get(module, {})
     shared = "options" if item.kind is item.KEYWORD_ONLY else "arguments"
     for table in (own.get(work.__name__, {}), own, texts[shared]):

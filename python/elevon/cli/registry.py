@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from dataclasses import dataclass
 
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,6 @@ class CommandEntry:
 _MODULES = {"import": "import_log"}
 COMMANDS = {
     name: CommandEntry(f"elevon.cli.{_MODULES.get(name, name.replace('-', '_'))}", text, group)
-    for group, commands in read_table("commands.toml")["purposes"].items()
+    for group, commands in packaged_toml("elevon.cli", "commands.toml")["purposes"].items()
     for name, text in commands.items()
 }

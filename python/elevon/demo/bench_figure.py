@@ -4,42 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from elevon.data import packaged_toml
 from elevon.report.figures import COLOURS, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Title, second line, left edge, bottom edge, colour. Sheet: 0 to 10 across, -0.7 to 4 up.
-_BOXES = (
-    ("Drive", "position, speed, current", 0.0, 2.6, "blue"),
-    ("Motor", "resolver", 2.7, 2.6, "blue"),
-    ("Gearbox 1:124", "friction, backlash", 5.4, 2.6, "blue"),
-    ("Output ring", "encoder", 8.1, 2.6, "blue"),
-    ("Chain and disk brake", "servo, torque loop", 2.7, 1.3, "green"),
-    ("Load cell", "24 bit, own clock", 5.4, 1.3, "green"),
-    ("Drive trace", "400 Hz CSV", 0.0, 0.0, "orange"),
-    ("Command note", "what the operator knows", 2.7, 0.0, "orange"),
-    ("Load-cell file", "80 Hz CSV", 5.4, 0.0, "orange"),
-)
 _WIDE, _HIGH = 2.1, 0.85
-_ARROWS = (
-    ((2.1, 3.02), (2.7, 3.02)),
-    ((4.8, 3.02), (5.4, 3.02)),
-    ((7.5, 3.02), (8.1, 3.02)),
-    ((3.75, 2.15), (3.75, 2.6)),
-    ((4.8, 1.85), (5.4, 1.85)),
-    ((5.4, 1.55), (4.8, 1.55)),
-    ((1.05, 2.6), (1.05, 0.85)),
-    ((6.45, 1.3), (6.45, 0.85)),
-)
 
 
 def bench_figure() -> Figure:
     """Draw the bench: actuator in blue, equipment in green, files in orange."""
+    sketch = packaged_toml("elevon.demo", "bench_figure.toml")
     with new_figure(width=8.6, height=4.0) as (figure, axes):
-        for title, text, left, bottom, colour in _BOXES:
+        for title, text, left, bottom, colour in sketch["boxes"]:
             _box(axes, (left, bottom), title, text, COLOURS[colour])
-        for start, end in _ARROWS:
+        for start, end in sketch["arrows"]:
             _arrow(axes, start, end)
         _line(axes, ((9.15, 3.45), (9.15, 3.85), (1.05, 3.85)))
         _arrow(axes, (1.05, 3.85), (1.05, 3.45))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape
 
@@ -20,21 +21,6 @@ if TYPE_CHECKING:
 
 _RATE = 12.0  # pictures a second
 _SPAN = 0.03  # rad of the gap from flank to flank of the drawing
-_STYLE = """
-:root { color-scheme: light dark; }
-.card { fill: #ffffff; stroke: #d5d9de; } .ink { fill: #1c2126; } .soft { fill: #5d6772; }
-.metal { fill: #b8c0c9; stroke: #7d8894; } .line { stroke: #5d6772; fill: none; stroke-width: 2; }
-.blue { fill: #1f69b5; } .arm { stroke: #1f69b5; stroke-width: 9; stroke-linecap: round; }
-.ghost { stroke: #c05f1b; stroke-width: 2; stroke-dasharray: 5 4; } .red { fill: #b8322a; }
-.green { fill: #21794f; } .grey { fill: #8a929d; }
-.trace { fill: none; stroke: #1f69b5; stroke-width: 1.3; } .axis { stroke: #d5d9de; }
-text { font: 13px system-ui, sans-serif; } .big { font-weight: 600; font-size: 15px; }
-@media (prefers-color-scheme: dark) { .card { fill: #1d2125; stroke: #343a41; }
-.ink { fill: #e4e7ea; } .soft { fill: #9aa5b1; } .metal { fill: #59636e; stroke: #8d98a4; }
-.line { stroke: #9aa5b1; } .blue { fill: #58a2ea; } .arm { stroke: #58a2ea; }
-.ghost { stroke: #e8935a; } .red { fill: #f0776c; } .green { fill: #4fbf8b; }
-.trace { stroke: #58a2ea; } .axis { stroke: #343a41; } }
-"""
 
 
 def animated_picture(bench: LiveBench) -> str:
@@ -60,10 +46,11 @@ def animated_picture(bench: LiveBench) -> str:
         *_trace(at, np.degrees(gap), length),
         *_strip(session["states"], float(at[0]), length),
     ]
+    style = (files("elevon.live") / "picture.css").read_text("utf-8")
     return (
         '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 760 330" role="img" '
         'aria-label="The live bench: motor, gear, lever, backlash, and the diagnosis">'
-        f"<style>{_STYLE}</style>"
+        f"<style>{style}</style>"
         '<rect class="card" x="1" y="1" width="758" height="328" rx="8"/>'
         f"{''.join(parts)}</svg>\n"
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.data import packaged_toml
 from elevon.errors import InputError
 from elevon.files import check_output, write_bytes, write_text
 from elevon.live.app import asset
@@ -31,23 +32,6 @@ _EVERY = 4  # samples to one that is stored
 _STATES = 2.0  # s between two states
 #: The modules in the order in which they use each other, joined into one script.
 _MODULES = ("dom", "source", "store", "plots", "picture", "command", "sliders", "main")
-#: What is done in the session, by wiring: the command, the fault.
-_SHOWS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
-    "rotary": (
-        {"terms": [{"kind": "sine", "amplitude": "6 deg", "bias": "10 deg",
-                    "frequency": "0.5 Hz"}]},
-        {"backlash@transmission": "0.5 deg"},
-    ),
-    "ballscrew": (
-        {"terms": [{"kind": "sine", "amplitude": "30 mm", "frequency": "0.25 Hz"}]},
-        {"backlash@transmission": "0.2 mm"},
-    ),
-    "landing_gear": (
-        {"mode": "gear", "steps": [{"time": 0.5, "action": "extend"},
-                                   {"time": 12, "action": "retract"}]},
-        {"friction_growth@screw": 300.0},
-    ),
-}  # fmt: skip
 
 
 def write_static(bench: LiveBench | LogReplay, folder: Path, *, force: bool = False) -> list[Path]:
@@ -90,17 +74,17 @@ def write_static(bench: LiveBench | LogReplay, folder: Path, *, force: bool = Fa
 def recorded_session(bench: LiveBench, seconds: float = SECONDS) -> dict[str, Any]:
     """Run a bench without a clock, break it on the way; return what the page needs of it."""
     unit = bench.unit
-    command, fault = _SHOWS[unit.actuator.wiring]
+    show = packaged_toml("elevon.live", "shows.toml")[unit.actuator.wiring]
     times: list[float] = []
     rows: list[Floats] = []
     states: list[dict[str, Any]] = []
     broken, noted = False, -np.inf
     examiner = Examiner(unit.actuator, (), None)
-    bench.panel.run(unit, command)
+    bench.panel.run(unit, show["command"])
     bench.loop.ring.append(unit.time, unit.values())
     while unit.time < seconds:
         if not broken and unit.time >= _BROKEN:
-            bench.act({"fault": fault})
+            bench.act({"fault": show["fault"]})
             broken = True
         bench.loop.sample()
         if len(rows) == 0 or bench.loop.ring.written % _EVERY == 0:

@@ -11,52 +11,17 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from elevon.data import packaged_toml
+
 if TYPE_CHECKING:
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
-COLOURS: dict[str, str] = {
-    "blue": "#2f7fd1",
-    "orange": "#e0782f",
-    "green": "#2f9e6e",
-    "red": "#d1483c",
-    "violet": "#8a6fd0",
-    "grey": "#8a929d",
-}
-"""Colours of middle lightness, legible on white and on near-black, distinct to the colour-blind."""
-
+_LOOK = packaged_toml("elevon.report", "figures.toml")
+COLOURS: dict[str, str] = dict(_LOOK["colours"])
 # Stand-ins that matplotlib writes as they are and that inline_svg turns into the page's colours.
 _INK = "#010203"
 _RULE = "#030201"
-
-_STYLE: dict[str, Any] = {
-    "axes.edgecolor": _INK,
-    "axes.facecolor": "none",
-    "axes.grid": True,
-    "axes.labelcolor": _INK,
-    "axes.labelsize": 9.5,
-    "axes.linewidth": 0.8,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "figure.facecolor": "none",
-    "font.family": "sans-serif",
-    "font.size": 9.5,
-    "grid.color": _RULE,
-    "grid.linewidth": 0.7,
-    "legend.fontsize": 9,
-    "legend.frameon": False,
-    "lines.linewidth": 1.5,
-    "savefig.facecolor": "none",
-    "svg.fonttype": "none",
-    "text.color": _INK,
-    "xtick.color": _INK,
-    "xtick.labelsize": 9,
-    "ytick.color": _INK,
-    "ytick.labelsize": 9,
-}
 
 
 @contextmanager
@@ -64,7 +29,9 @@ def _style(**more: Any) -> Iterator[None]:
     import matplotlib as mpl
     from cycler import cycler
 
-    settings: Any = _STYLE | {"axes.prop_cycle": cycler(color=list(COLOURS.values()))} | more
+    settings: Any = (
+        _LOOK["style"] | {"axes.prop_cycle": cycler(color=list(COLOURS.values()))} | more
+    )
     with mpl.rc_context(settings):
         yield
 

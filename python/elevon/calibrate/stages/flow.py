@@ -13,6 +13,7 @@ from elevon.calibrate.stages.drive import drive
 from elevon.calibrate.stages.heat import heat
 from elevon.calibrate.stages.loops_by_current import loops_by_current
 from elevon.calibrate.stages.moves import moves_of, rig_moves
+from elevon.data import packaged_toml
 from elevon.errors import InputError, unknown
 from elevon.logs.log import Log
 from elevon.parameters.records import record_of, records
@@ -50,52 +51,8 @@ STAGES = (
           "gains where no set point was logged", loops_by_current),
     Stage("heat", _PRELOAD, "temperatures over minutes", "thermal networks", heat),
 )  # fmt: skip
-#: What no log of these roles shows.
-_NEVER = {
-    _UNIT: {
-        "motor.bearing_torque": "the rig shows it only within the whole train's friction (FFM)",
-        "friction.breakaway_ratio": "the rig imposes the motion: nothing breaks away",
-        "lock.stiffness": "the seat deflects by less than the position's noise",
-        "lock.strength": "nothing broke",
-        "lock.spring_force": "the sleeve's spring and the screw's efficiency slow the nut alike",
-        "lock.travel": "the nut stops before it",
-        "screw.efficiency_force": "its loss bends too little over the loads to tell it from both "
-        "ends",
-        "gear.efficiency_first": "only the product with the screw's efficiency shows",
-        "gear.efficiency_second": "only the product with the screw's efficiency shows",
-        "leg.inertia": "changes the torque as a hundredth of the motor's own inertia would",
-    },
-    _PRELOAD: {
-        "friction.static": "a reversal breaks away within a sample or two",
-        "backlash.total": "both positions are read on one side of the joint, or too coarsely",
-        "backlash.stiffness": "the joint deflects by less than the corners' own error",
-        "control.current_limit": "the logs do not reach this limit for long",
-        "control.speed_limit": "the logs do not reach this limit",
-        "inverter.supply_voltage": "the logs do not reach this limit",
-        "control.torque_constant": "the drive's own belief: only its product with the gain shows",
-        "screw.inertia": "turns with the motor's own",
-        "screw.nut_heat_share": "scales the nut's capacity and its resistance alike",
-        "thermal.emissivity": "near the air's temperature radiation looks like convection",
-    },
-}
-#: What values stand on.
-_GIVEN = {
-    _UNIT: {
-        "lock.engage_travel": ("proximity.delay",),
-        "lock.release_travel": ("proximity.delay",),
-        "motor.inertia": ("screw.inertia", "gear.inertia_first", "gear.inertia_second"),
-        "screw.efficiency_unloaded": ("gear.efficiency_first", "gear.efficiency_second"),
-        "screw.efficiency_loaded": ("screw.efficiency_force",),
-    },
-    _PRELOAD: {
-        "control.speed_gain": ("control.torque_constant",),
-        "motor.inertia": ("screw.inertia",),
-        "thermal.winding_mass": ("thermal.winding_heat",),
-        "thermal.convection": ("thermal.area", "thermal.emissivity"),
-        "screw.nut_capacity": ("screw.nut_heat_share",),
-        "screw.nut_to_air": ("screw.nut_heat_share",),
-    },
-}
+#: Parameters that state which table of `unseen.toml` holds.
+_KINDS = {_UNIT: "unit", _PRELOAD: "preload"}
 
 
 @one_blas_thread()
@@ -158,9 +115,10 @@ def calibrate_parts(
 def _run(context: Context) -> None:
     """Run the stages that serve this actuator."""
     known = records(context.actuator.wiring)
-    for of in _NEVER.keys() & known.keys():
-        context.reasons |= _NEVER[of]
-        context.given |= _GIVEN[of]
+    for kind in (_KINDS[path] for path in _KINDS if path in known):
+        unseen = packaged_toml("elevon.calibrate.stages", "unseen.toml")[kind]
+        context.reasons |= unseen["never"]
+        context.given |= {path: tuple(paths) for path, paths in unseen["given"].items()}
     if _UNIT in known:
         context.facts["kinds"] = {
             log.name: "rig" if rig_moves(log) else "motion" if moves_of(log) else "rest"

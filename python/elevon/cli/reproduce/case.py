@@ -14,7 +14,7 @@ import typer
 from elevon.cli.help import PlainCommand
 from elevon.cli.options import annotated
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 from elevon.reproduce.catalogue import Published, published
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class PublishedCase:
             }
         if self.seeded:
             common["seed"] = (int, 0)
-        texts = read_table("options.toml")["case"]
+        texts = packaged_toml("elevon.cli", "options.toml")["case"]
         shared = {
             name: (annotated(name, kind, texts[name]), default)
             for name, (kind, default) in common.items()

@@ -7,7 +7,7 @@ from typing import Any
 
 from elevon.cli.output import answer, print_table, say
 from elevon.cli.reproduce.case import Options, Values, check_file, print_columns, read_cases
-from elevon.cli.tables import read_table
+from elevon.data import packaged_toml
 
 
 def low_fidelity(actuator: str, seed: int, progress: Any = None) -> Any:
@@ -141,4 +141,4 @@ _STEPS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "pisa-failures": {"show": _show_failures},
     "cranfield": {"show": _show_cranfield},
 }
-CASES = read_cases(read_table("cases.toml", "elevon.cli.reproduce"), _STEPS)
+CASES = read_cases(packaged_toml("elevon.cli.reproduce", "cases.toml"), _STEPS)

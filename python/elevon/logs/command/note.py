@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+from elevon.data import packaged_toml
 from elevon.documents import Document, check_depth, validated
 from elevon.errors import FormatError, InputError, did_you_mean, quoted
 from elevon.files import read_regular
@@ -32,28 +33,9 @@ _MOST_BYTES = 1_000_000
 _LARGEST = 1e300  # greater whole numbers are no floats; reading the value refuses them
 _MOST_TERMS = 1000
 _MOST_TABLE = 50_000_000  # bytes of a table's file
-_KINDS: dict[str, str] = {
-    "amplitude": "deg", "bias": "deg", "phase": "deg", "initial": "deg", "final": "deg",
-    "low": "deg", "high": "deg", "value": "deg", "slope": "deg/s",
-    "frequency": "Hz", "start_frequency": "Hz", "end_frequency": "Hz",
-    "start": "s", "end": "s", "time": "s", "sweep_time": "s", "rise": "s", "fall": "s",
-    "hold_high": "s", "hold_low": "s",
-    "load_cell_arm": "m",
-}  # fmt: skip
-_SPELLINGS: dict[str, str] = {
-    "kind": "waveform", "shape": "waveform", "type": "waveform", "command": "waveform",
-    "amp": "amplitude", "offset": "bias", "mean": "bias", "freq": "frequency", "f": "frequency",
-    "sinamp": "amplitude", "sinbias": "bias", "sinfrq": "frequency", "chirptg": "sweep_time",
-    "stepini": "initial", "stepfin": "final", "steptime": "time", "rampic": "initial",
-    "rampslope": "slope", "ramptime": "start", "f0": "start_frequency", "f1": "end_frequency",
-    "f_start": "start_frequency", "f_end": "end_frequency", "initial_frequency": "start_frequency",
-    "final_frequency": "end_frequency", "target_time": "sweep_time", "duration": "sweep_time",
-    "start_time": "start", "t0": "start", "end_time": "end", "step_time": "time",
-    "arm": "load_cell_arm", "loadcell_arm": "load_cell_arm", "brake_arm": "load_cell_arm",
-    "lever_arm": "load_cell_arm", "arm_length": "load_cell_arm", "chain": "chain_ratio",
-    "brake_on": "brake", "current_convention": "current", "currents": "current",
-    "convention": "current",
-}  # fmt: skip
+_KEYS = packaged_toml("elevon.logs.command", "keys.toml")
+_KINDS: Mapping[str, str] = _KEYS["units"]
+_SPELLINGS = {other: name for name, others in _KEYS["spellings"].items() for other in others}
 _SUFFIX = re.compile(r"_(?:deg|degrees|hz|s|sec|seconds|m|deg_s|deg_per_s)$")
 _BRAKE = {"on": True, "true": True, "yes": True, "off": False, "false": False, "no": False}
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
+from elevon.data import packaged_toml
 from elevon.documents import Document
 from elevon.errors import InputError, unknown
 from elevon.parameters.parameter import Confidence, Parameter
@@ -20,65 +21,31 @@ LINEAR: Mapping[str, bool] = MappingProxyType({"ballscrew": True, "rotary": Fals
 
 KINDS = ("brushless", "servo", "dc")
 
-_BOTH = (
-    ("supply", "V", "DC link; of a direct-current motor its terminals"),
-    ("power", "W", "rated power at the motor's shaft"),
-    ("motor_speed", "rad/s", "rated speed of the motor"),
-    ("gear", "1", "turns of the motor per turn behind the gear, such as 4"),
-    ("encoder", "1", "counts per turn of the motor"),
-    ("efficiency", "1", "of gear and screw at the rating"),
-    ("bandwidth", "Hz", "of the position loop"),
-    ("motor.kind", "1", "whose constants: brushless (line to line, peak), servo (rms), dc"),
-    ("motor.torque_constant", "N m/A", "torque per ampere"),
-    ("motor.resistance", "ohm", "between two terminals"),
-    ("motor.inductance", "H", "between two terminals"),
-    ("motor.inertia", "kg m2", "of the rotor"),
-    ("motor.pole_pairs", "1", "pole pairs"),
-    ("motor.current", "A", "continuous"),
-    ("motor.peak_current", "A", "for seconds"),
-)  # fmt: skip
-_LINEAR = (
-    ("thrust", "N", "rated force of the ram"),
-    ("speed", "m/s", "rated speed of the ram"),
-    ("lead", "m", "travel per turn of the screw"),
-    ("stroke", "m", "whole travel, half of it to either side of zero"),
-    ("backlash", "m", "whole backlash at the ram"),
-    ("mass", "kg", "what the ram moves"),
-)
-_ROTARY = (
-    ("torque", "N m", "rated torque of the output"),
-    ("speed", "rad/s", "rated speed of the output"),
-    ("stroke", "rad", "whole travel, half of it to either side of zero"),
-    ("backlash", "rad", "whole backlash at the output"),
-    ("inertia", "kg m2", "what the output moves"),
-)
-_WHOLE = {"encoder", "motor.pole_pairs"}
-_MAY_BE_ZERO = {"backlash", "mass", "inertia"}
-
 
 @lru_cache(maxsize=4)
 def quantities(wiring: str) -> Mapping[str, Record]:
     """Return what ``[design]`` may hold for a wiring, by name; empty where no rules are."""
     if wiring not in LINEAR:
         return MappingProxyType({})
-    rows = (*_BOTH, *(_LINEAR if LINEAR[wiring] else _ROTARY))
-    return MappingProxyType({name: _record(name, unit, text) for name, unit, text in rows})
+    table = packaged_toml("elevon.parameters.design", "quantities.toml")
+    rows = table["both"] | table["linear" if LINEAR[wiring] else "rotary"]
+    return MappingProxyType({name: _record(name, **row) for name, row in rows.items()})
 
 
-def _record(name: str, unit: str, text: str) -> Record:
+def _record(name: str, unit: str, text: str, *, whole: bool = False, zero: bool = False) -> Record:
     return Record(
         path=f"design.{name}",
         symbol="",
         unit=unit,
         minimum=0.0,
         maximum=1.0 if name == "efficiency" else math.inf,
-        minimum_open=name not in _MAY_BE_ZERO,
+        minimum_open=not zero,
         maximum_open=False,
         text=text,
         register="plant",
         default=None,
         choices=KINDS if name == "motor.kind" else None,
-        whole=name in _WHOLE,
+        whole=whole,
     )
 
 

@@ -7,13 +7,12 @@ the model. A rule that rests on a number nobody gave says so in its text (ASSUME
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Protocol
 
+from elevon.data import packaged_toml
 from elevon.parameters.design.formula import evaluate
 from elevon.parameters.relations import copper_loss, torque_constant
 
@@ -175,7 +174,7 @@ class Rule:
 @cache
 def rules() -> Mapping[str, tuple[Rule, ...]]:
     """Return the rules by the number of a design or the path of the parameter that they derive."""
-    table = tomllib.loads((files("elevon.parameters.design") / "rules.toml").read_text("utf-8"))
+    table = packaged_toml("elevon.parameters.design", "rules.toml")
     return {
         name: tuple(Rule(**{**row, "given": tuple(row.get("given", ()))}) for row in rows)
         for name, rows in table.items()
