@@ -93,8 +93,10 @@ def test_each_text_of_an_option_belongs_to_a_parameter():
     texts = packaged_toml("elevon.cli", "options.toml")
     for name in texts.keys() - {"arguments", "options", "case"}:
         module = import_module(homes.get(name, f"elevon.cli.{name}"))
-        own = [f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__]
-        taken = {function.__name__: {*signature(function).parameters} for function in own}
+        functions = [
+            f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__
+        ]
+        taken = {function.__name__: {*signature(function).parameters} for function in functions}
         for entry, words in texts[name].items():
             if "help" in words:
                 assert any(entry in parameters for parameters in taken.values()), (name, entry)

@@ -165,12 +165,12 @@ def test_formulas_name_what_a_design_or_an_actuator_has(wiring):
         for rule in (row for row in rows if row.form in {"", wiring}):
             names = []
             evaluate(rule.value, lambda each, names=names: names.append(each) or 1.0)
-            own = (
+            load = (
                 {"thrust", "torque"}
                 if rule.given and rule.given[-1] in {"thrust", "torque"}
                 else set()
             )
-            assert {*names} <= known | own, (name, rule.name)
+            assert {*names} <= known | load, (name, rule.name)
 
 
 @pytest.mark.parametrize("formula", ["open('x')", "a if b else c", "a[0]", "'text'", "a % b"])

@@ -78,9 +78,9 @@ def _entry(work: Callable[..., object], item: inspect.Parameter) -> Mapping[str,
     """Return the entry of one parameter: the function's own, its module's, the shared one."""
     module = work.__module__.rpartition(".")[2]
     texts = packaged_toml("elevon.cli", "options.toml")
-    own = texts.get(module, {})
+    of_module = texts.get(module, {})
     shared = "options" if item.kind is item.KEYWORD_ONLY else "arguments"
-    for table in (own.get(work.__name__, {}), own, texts[shared]):
+    for table in (of_module.get(work.__name__, {}), of_module, texts[shared]):
         entry: Mapping[str, Any] = table.get(item.name, {})
         if "help" in entry:
             return entry
