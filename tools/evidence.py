@@ -1,18 +1,28 @@
 """Run the commands behind the evidence, keep what they wrote: `python tools/evidence.py [NAME]`.
 
+    python tools/evidence.py torino-drops               runs `elevon reproduce torino-drops`
+    python tools/evidence.py NAME --command "..."       runs another command that prints `checks`
+    python tools/evidence.py NAME --command "..." --printed FILE    keeps what it printed elsewhere
+    python tools/evidence.py --check [NAME]             runs again and compares, writes nothing
+    python tools/evidence.py --pages                    writes the records into the pages
+
 Each record, docs/evidence/runs/NAME.json, has the command, the day, the commit and the checks as
-the command printed them. `make docs` makes the pages of them; `--check` runs the commands again
-and compares, and writes nothing.
+the command printed them. A page shows one between `<!-- run NAME -->` (a sentence) or
+`<!-- checks NAME -->` (a table) and `<!-- end -->`; `make docs` makes a page of all of them.
 """
 
+import argparse
 import datetime
 import json
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-RUNS = ROOT / "docs" / "evidence" / "runs"
+PAGES = ROOT / "docs" / "evidence"
+RUNS = PAGES / "runs"
 #: Published cases that need no foreign data and take at most some minutes.
 CASES = (
     "torino-backlash", "torino-compliance", "torino-validation", "torino-loaded", "torino-drops",
@@ -20,44 +30,110 @@ CASES = (
     "pisa-friction", "pisa-hydraulic", "nasa-faults", "nasa-flight", "pisa-validation",
     "pisa-commutation",
 )  # fmt: skip
+BLOCK = re.compile(r"^<!-- (run|checks) (\S+) -->\n.*?^<!-- end -->$", re.M | re.S)
 
 
 def main(arguments: list[str]) -> int:
-    """Write, or check, the records of the cases named; all of them by default."""
-    check = "--check" in arguments
+    """Write, or check, the records of the cases named; all published ones by default."""
+    options = _options(arguments)
     wrong = 0
-    for name in [word for word in arguments if word != "--check"] or CASES:
-        checks = checks_of(name)
-        kept = RUNS / f"{name}.json"
-        if check:
-            same = json.loads(kept.read_text("utf-8"))["checks"] == checks
+    for name in [] if options.pages else options.names or CASES:
+        command = options.command or f"elevon reproduce {name}"
+        if options.check:
+            same = run_again(name)
             print(f"{name}: {'the same' if same else 'DIFFERENT'}", flush=True)
             wrong += not same
         else:
-            kept.write_text(json.dumps(record(name, checks), indent=1) + "\n", "utf-8")
+            printed = options.printed.read_text("utf-8") if options.printed else _printed(command)
+            checks = list(json.loads(printed)["checks"])
+            text = json.dumps(record(command, checks), indent=1)
+            (RUNS / f"{name}.json").write_text(text + "\n", "utf-8")
             print(f"{name}: {len(checks)} checks", flush=True)
+    if not options.check:
+        for path in sorted(PAGES.glob("*.md")):
+            path.write_text(filled(path.read_text("utf-8")), "utf-8")
     return 1 if wrong else 0
 
 
-def checks_of(name: str) -> list[dict[str, object]]:
-    """Run a case and return its checks."""
-    words = [sys.executable, "-m", "elevon", "reproduce", name, "--json"]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 1):
-        raise SystemExit(f"{name}: exit {done.returncode}\n{done.stderr}")
-    return list(json.loads(done.stdout)["checks"])
+def _options(arguments: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--check", action="store_true", help="run again and compare")
+    parser.add_argument("--pages", action="store_true", help="write the records into the pages")
+    parser.add_argument("--command", help="what was run, if not `elevon reproduce NAME`")
+    parser.add_argument("--printed", type=Path, help="what that command printed with --json")
+    options = parser.parse_args(arguments)
+    if (options.command or options.printed) and (len(options.names) != 1 or options.check):
+        parser.error("--command and --printed are of one record, which is written")
+    return options
 
 
-def record(name: str, checks: list[dict[str, object]]) -> dict[str, object]:
+def kept(name: str) -> dict[str, object]:
+    """Return a record."""
+    return dict(json.loads((RUNS / f"{name}.json").read_text("utf-8")))
+
+
+def run_again(name: str) -> bool:
+    """Whether a record's command still writes what the record holds."""
+    run = kept(name)
+    return list(json.loads(_printed(str(run["command"])))["checks"]) == run["checks"]
+
+
+def record(command: str, checks: list[dict[str, object]]) -> dict[str, object]:
     """Return what is kept of a run."""
     words = ["git", "rev-parse", "--short=7", "HEAD"]
     commit = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     return {
-        "command": f"elevon reproduce {name}",
+        "command": command,
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         "commit": commit.strip(),
         "checks": checks,
     }
+
+
+def filled(text: str) -> str:
+    """Return a page with its records as they are kept now."""
+    return BLOCK.sub(lambda m: f"<!-- {m[1]} {m[2]} -->\n{_block(m[1], m[2])}<!-- end -->", text)
+
+
+def _block(form: str, name: str) -> str:
+    run = kept(name)
+    checks = [dict(check) for check in run["checks"]]  # type: ignore[attr-defined]
+    missed = [check for check in checks if not check["passed"]]
+    text = f"`{run['command']}`, {run['date']}, commit `{run['commit']}`: "
+    text += f"{len(checks) - len(missed)} of {len(checks)} checks pass.\n"
+    if form == "checks":
+        rows = [f"| {c['name']} | {_value(c)} | {_limit(c)} | {_yes(c)} |" for c in checks]
+        return "\n".join(
+            [text, "| check | value | limit | passed |", "|---|---|---|---|", *rows, ""]
+        )
+    lines = [f"* not met: {c['name']}: {_value(c)} ({_limit(c)})" for c in missed]
+    return "\n".join([text, *lines, ""]) if lines else text
+
+
+def _value(check: dict[str, object]) -> str:
+    unit = f" {check['unit']}" if check.get("unit") else ""
+    return f"{check['value']:.4g}{unit}"
+
+
+def _limit(check: dict[str, object]) -> str:
+    return f"at {'least' if check['at_least'] else 'most'} {check['limit']:.4g}"
+
+
+def _yes(check: dict[str, object]) -> str:
+    return "yes" if check["passed"] else "no"
+
+
+def _printed(command: str) -> str:
+    """Run a command with --json; return what it printed."""
+    words = shlex.split(command)
+    start = words[1:] if words[0] == "python" else ["-m", *words]
+    done = subprocess.run(
+        [sys.executable, *start, "--json"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"{command}: exit {done.returncode}\n{done.stderr}")
+    return done.stdout
 
 
 if __name__ == "__main__":

@@ -42,9 +42,8 @@ def cases(paths: list[Path]) -> str:
         text += (
             f"## {path.stem}\n\n`{run['command']}`, {run['date']}, commit `{run['commit']}`.\n\n"
         )
-        head = list(run["checks"][0])
-        rows = [[cell(check.get(key)) for key in head] for check in run["checks"]]
-        text += table([plain(key) for key in head], rows) + "\n"
+        rows = [cells(check) for check in run["checks"]]
+        text += table(["check", "value", "limit", "the work's own", "passed"], rows) + "\n"
     return text
 
 
@@ -78,6 +77,11 @@ def sections(work: PublishedWork) -> str:
     return f"Of the text:\n\n{unique}\n\n" if lines else ""
 
 
-def cell(value: object) -> str:
-    """Return a value of a check as a page shows it."""
-    return f"{value:.5g}" if isinstance(value, float) else plain(value)
+def cells(check: dict[str, object]) -> list[str]:
+    """Return a check as a row of a page."""
+    unit = f" {check['unit']}" if check.get("unit") else ""
+    printed = "" if check.get("ours") is None else f"{check['ours']:.5g}{unit}"
+    way = "at least" if check["at_least"] else "at most"
+    passed = "yes" if check["passed"] else "no"
+    name = plain(check["name"])
+    return [name, f"{check['value']:.5g}{unit}", f"{way} {check['limit']:.5g}", printed, passed]

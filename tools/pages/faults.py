@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from records import code, plain
 
 import elevon
+from elevon import _core
 from elevon.reproduce.signatures import Signature, reproduce_signatures
 from elevon.units import display_unit, format_quantity
 
@@ -64,6 +65,14 @@ def entry(row: Signature, name: str) -> str:
     )
 
 
+def unit_of(row: Signature) -> str:
+    """Return the unit of a fault's signal, as an axis names it."""
+    wiring = elevon.Actuator.load(row.actuator).wiring
+    units = {signal["name"]: signal["unit"] for signal in _core.signals(wiring, "high")}
+    unit = units.get(row.signal, "")
+    return f", {unit}" if unit not in ("", "1") else ""
+
+
 def picture(row: Signature) -> bytes:
     """Return both runs of the signal that changes most, as SVG."""
     figure = Figure(figsize=(6.4, 2.2), layout="constrained")
@@ -74,8 +83,8 @@ def picture(row: Signature) -> bytes:
         step = max(1, len(row.time) // 400)
         axis.plot(row.time[::step], np.asarray(values)[::step], color=colour, label=label, lw=1)
     axis.set_xlabel("time, s")
-    axis.set_ylabel(row.signal.replace("_", " "))
-    axis.legend(loc="upper right", fontsize=8)
+    axis.set_ylabel(f"{row.signal.replace('_', ' ')}{unit_of(row)}")
+    figure.legend(loc="outside upper right", ncols=2, fontsize=8, frameon=False)
     axis.grid(visible=True, lw=0.3)
     out = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "elevon", "svg.fonttype": "path"}):

@@ -17,7 +17,9 @@ WIDTHS = (390, 820, 1400)
 PAGES = (
     "index.html", "start/five-minutes.html", "how-to/diagnose.html", "gallery/torino-rotary.html",
     "reference/commands/simulate.html", "reference/python-api.html",
-    "explanation/theory/rotary.html", "evidence/diagnosis.html", "examples/gallery/first_run.html",
+    "explanation/theory/rotary.html", "explanation/theory/landing-gear.html",
+    "evidence/diagnosis.html", "evidence/published-cases.html", "reference/glossary.html",
+    "examples/gallery/first_run.html",
 )  # fmt: skip
 STEPS = 12
 #: ms for a page on a machine that others use.

@@ -5,6 +5,9 @@ import re
 from docutils import nodes
 from latex2mathml.converter import convert
 
+#: Names that stand apart from what they are of; the converter sets them as letters.
+FUNCTION = re.compile(r"<mi>(sin|cos|tan|exp|ln|log|max|min|arccos|sgn|clamp|wrap)</mi>")
+
 
 def inline(self, node):
     """Write an inline formula."""
@@ -22,7 +25,9 @@ def _mathml(text, display):
     """Return MathML; refused where a command is unknown: it would be printed as text."""
     for form in ("begin", "end"):  # the converter knows the same table by another name
         text = text.replace(f"\\{form}{{aligned}}", f"\\{form}{{split}}")
-    made = convert(text.strip(), display=display)
+    made = FUNCTION.sub(
+        r'<mo lspace="0.17em" rspace="0.17em">\1</mo>', convert(text.strip(), display=display)
+    )
     if left := re.search(r"\\[a-zA-Z]+|<m[io]>&<", made):
         raise ValueError(f"formula {text!r}: {left.group()} is not understood")
     return made
