@@ -49,6 +49,9 @@ class CandidateFault:
         Whether it is there or not: it acts in full from one half on.
     whole : bool
         Whether it is that, or counted.
+    amplified : tuple of str
+        Plausibility features that grow by the severity as a share: a loop's gain amplifies noise,
+        which no model run has.
     """
 
     kind: str
@@ -64,6 +67,7 @@ class CandidateFault:
     ambiguous: tuple[tuple[str, str], ...] = ()
     switched: bool = False
     whole: bool = False
+    amplified: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -84,6 +88,7 @@ _BEARING, _SENSOR, _MOTOR, _CONNECTOR = 1.78e-5, 1.70e-5, 1.03e-5, 6.64e-7
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _RINGS = tuple(f"bearing.{p}" for p in ("outer", "inner", "ball"))
 _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
+_LOOP_NOISE = ("target_noise", "control_noise", "voltage_noise", "voltage_rest")
 _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage_sideband")
 
 # How well the reduced-order model knows what a fault does, ASSUMED from benches with another
@@ -114,8 +119,10 @@ CANDIDATES: tuple[CandidateFault, ...] = (
     CandidateFault("demagnetisation", "motor", "1", 0.0, 0.4, _MOTOR / 4, 0.05,
                    ambiguous=(("offset", "sensor.resolver"),)),
     CandidateFault("unbalance", "motor.rotor", "kg m2", 0.0, 4e-4, _BEARING / 10, 0.05),
-    CandidateFault("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003),
-    CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05),
+    CandidateFault("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003,
+                   amplified=("reference_noise", *_LOOP_NOISE)),
+    CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05,
+                   amplified=_LOOP_NOISE),
     CandidateFault("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01,
                    known_features=("position_scale",),
                    ambiguous=(("gain", "sensor.resolver"),)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,11 +11,16 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import SEEN, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.detection import DRAWS, Detector
+from elevon.diagnose.engine.frame import STRAY
 from elevon.diagnose.engine.healthy import Elsewhere, Healthy, healthy
-from elevon.diagnose.engine.reading import Reading
+from elevon.diagnose.engine.plausibility import Plausibility, plausibility
+from elevon.diagnose.engine.reading import Reading, ReplayUnit
 from elevon.diagnose.engine.replay import Replay, bounded, modelled, replay
 from elevon.diagnose.engine.spread import LearnedSpread
 from elevon.diagnose.engine.table import FeatureVector
+from elevon.experiment import Variant
+
+Faults = Sequence[tuple[CandidateFault, float]]
 
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
@@ -43,6 +48,10 @@ class LogCase:
         What the log lacks, and baselines that were left out.
     misfit : Reason or None
         Where the model shows none of the unit's baselines: what of them it shows least.
+    plausible : Plausibility
+        What no candidate is looked for by.
+    item : Reading, optional
+        That runs the log's test.
     """
 
     name: str
@@ -51,6 +60,8 @@ class LogCase:
     model: Replay
     findings: tuple[str, ...] = ()
     misfit: Reason | None = None
+    plausible: Plausibility = field(default_factory=Plausibility)
+    item: Reading | None = None
 
     @property
     def covariance(self) -> Floats:
@@ -119,7 +130,12 @@ def case_of(
     sound, findings, misfit = _sound(references, candidates, against)
     unit = healthy(model, names, sound, elsewhere, spread)
     findings += item.notes(same)
-    return LogCase(item.name, item.features.only(names), unit, model, tuple(findings), misfit)
+    trusted = [
+        b for b, (_, known) in zip(same, references, strict=True) if any(known is s for s in sound)
+    ]
+    features = item.features.only(names)
+    plausible = plausibility(item, trusted)
+    return LogCase(item.name, features, unit, model, tuple(findings), misfit, plausible, item)
 
 
 def transferred(item: Reading, model: Replay) -> FeatureVector:
@@ -172,6 +188,11 @@ def farthest(case: LogCase) -> Reason:
     std = np.sqrt(np.diag(case.covariance))
     score = (case.features.values - case.unit.mean) / std
     k = int(np.argmax(np.abs(score)))
+    plausible = case.plausible
+    if len(plausible.names) and np.abs(plausible.score).max() > abs(score[k]):
+        k = int(np.argmax(np.abs(plausible.score)))
+        limit = plausible.mean[k] + SEEN * np.sign(plausible.score[k]) * plausible.std[k]
+        return Reason(plausible.names[k], float(plausible.values[k]), float(limit))
     limit = case.unit.mean[k] + SEEN * np.sign(score[k]) * std[k]
     return Reason(case.unit.names[k], float(case.features.values[k]), float(limit))
 
@@ -225,6 +246,52 @@ def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:
 def shift_of(cases: Sequence[LogCase], key: str, severity: Floats) -> Floats:
     """Return what severities, shape (m,), do to the features of all logs, shape (m, k)."""
     return np.hstack([case.shift(key, severity) for case in cases])
+
+
+def allowed(cases: Sequence[LogCase], sets: Sequence[Faults], runs: Sequence[bool]) -> Floats:
+    """Return by how much sets of faults let stray what they are not looked for by, shape (h, m).
+
+    In deviations: a share of their whole shift, and what a model run makes of it, which has neither
+    noise nor a sampled controller.
+
+    Parameters
+    ----------
+    cases : sequence of LogCase
+        The logs.
+    sets : sequence of sequence of (CandidateFault, float)
+        Faults and severities.
+    runs : sequence of bool
+        Whether a set is worth a run.
+    """
+    _, covariance = joined(cases)
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    strays = []
+    for faults in sets:
+        moved = [shift_of(cases, c.key, np.array([s]))[0] for c, s in faults]
+        strays.append(STRAY * float(np.linalg.norm(root @ np.sum(moved, axis=0))) if moved else 0.0)
+    chosen = [faults if run else () for faults, run in zip(sets, runs, strict=True)]
+    rows = np.hstack([_run_plausible(case, chosen) for case in cases])
+    return np.asarray(np.hypot(rows, np.array(strays)[:, None]), dtype=np.float64)
+
+
+def _run_plausible(case: LogCase, sets: Sequence[Faults]) -> Floats:
+    """How far model runs with faults move it, shape (h, m), in deviations."""
+    names, out = case.plausible.names, np.zeros((len(sets), len(case.plausible.names)))
+    size = np.abs(case.plausible.mean) / case.plausible.std
+    for k, faults in enumerate(sets):
+        for c, severity in faults:
+            out[k] += np.isin(names, c.amplified) * abs(severity) * size
+    at = [k for k, faults in enumerate(sets) if faults]
+    if case.item is None or not names or not at:
+        return out
+    units = [Variant(faults=tuple(c.text(s) for c, s in sets[k])) for k in at]
+    healthy, *others = case.item.plausible_of([ReplayUnit(), *map(ReplayUnit, units)])
+    for k, seen in zip(at, others, strict=True):
+        known = [n for n in names if n in healthy.names and n in seen.names]
+        moved = np.abs(seen.only(known).values - healthy.only(known).values)
+        places = [names.index(n) for n in known]
+        out[k, places] += moved / case.plausible.std[places]
+    return out
 
 
 def uncertainty_of(cases: Sequence[LogCase], key: str, severity: float) -> Floats:

@@ -8,10 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from elevon.diagnose.engine.answer import Diagnosis, Reason
+from elevon.diagnose.engine.answer import SEEN, Diagnosis, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import (
     LogCase,
+    allowed,
     detector_of,
     errors_of,
     farthest,
@@ -19,6 +20,7 @@ from elevon.diagnose.engine.case import (
     shift_of,
     uncertainty_of,
 )
+from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.explain import (
     NO_CANDIDATE,
     alternatives,
@@ -30,11 +32,13 @@ from elevon.diagnose.engine.explain import (
     unexplained,
 )
 from elevon.diagnose.engine.likelihood import Hypothesis
+from elevon.diagnose.engine.plausibility import SHARE, chance_of_any, weigh_plausibility
 from elevon.diagnose.engine.posterior import Posterior, posterior
 from elevon.diagnose.engine.spread import LearnedSpread
 
 _ALL = 128  # pairs of faults that are all scored; of more the most promising of a faulty log
 _MOST = 16
+_WORTH = 0.01  # probability from which on a set of faults is worth a run
 _UNKNOWN = 0.5  # probability of no candidate from which on none is named
 MISFIT: Literal["model_does_not_fit"] = "model_does_not_fit"
 Status = Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit"]
@@ -65,13 +69,10 @@ def answer_of(
     blind, least = limits(cases, candidates, root)
     # What the logs cannot show would keep its prior, whatever they say: it is left out.
     seen = [c for c in candidates if c.key in least] or candidates
-    chance = detector.chance(score)
-    faulty = score > detector.threshold(rate)
-    if spread is not None and len(cases) == 1:
-        chance = spread.chance(chance, cases[0].unit.baselines, rate)
-        faulty = chance <= rate
+    chance, faulty = _judged(detector, score, cases, rate, spread)
     few = len(seen) * (len(seen) - 1) // 2 <= _ALL
     result = _posterior_of(cases, seen, pairs=faulty or few, most=None if few else _MOST)
+    result = _with_plausibility(cases, seen, result)
     best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
@@ -98,6 +99,42 @@ def answer_of(
         p_other=result.other,
         reason=reason,
     )
+
+
+def _with_plausibility(
+    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], result: Posterior
+) -> Posterior:
+    """Weigh the hypotheses by what no candidate is looked for by; likely ones are run."""
+    score = np.concatenate([case.plausible.score for case in cases])
+    if np.abs(score).max(initial=0.0) < SEEN:
+        return result
+    known = {c.key: c for c in candidates}
+    sets = [[(known[k], b) for k, b in zip(h.keys, h.best, strict=True)] for h in result.hypotheses]
+    runs = [p >= _WORTH for p in result.probabilities]
+    degrees = min(case.plausible.degrees for case in cases)
+    return weigh_plausibility(result, score, degrees, allowed(cases, sets, runs))
+
+
+def _judged(
+    detector: Detector,
+    score: float,
+    cases: Sequence[LogCase],
+    rate: float,
+    spread: LearnedSpread | None,
+) -> tuple[float, bool]:
+    """Return how often a healthy unit deviates as much, and whether that is an alarm.
+
+    Where there is something that no candidate moves, it has its share of the false alarms.
+    """
+    plausible = [case.plausible for case in cases]
+    share = SHARE if any(item.names for item in plausible) else 0.0
+    chance = min(detector.chance(score) / (1.0 - share), 1.0)
+    faulty = score > detector.threshold(rate * (1.0 - share))
+    if spread is not None and len(cases) == 1:
+        chance = spread.chance(detector.chance(score), cases[0].unit.baselines, rate)
+        faulty = chance <= rate
+    odd = chance_of_any(plausible) / SHARE
+    return min(chance, odd), faulty or odd <= rate
 
 
 def _status(
@@ -132,7 +169,7 @@ def _worst(cases: Sequence[LogCase]) -> int:
     scores = []
     for case in cases:
         off = np.abs(case.features.values - case.unit.mean) / np.sqrt(np.diag(case.covariance))
-        scores.append(float(off.max()))
+        scores.append(max(float(off.max()), float(np.abs(case.plausible.score).max(initial=0.0))))
     return int(np.argmax(scores))
 
 

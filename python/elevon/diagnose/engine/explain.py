@@ -18,7 +18,14 @@ from elevon.diagnose.engine.answer import (
     SuspectedFault,
 )
 from elevon.diagnose.engine.candidates import CandidateFault
-from elevon.diagnose.engine.case import LogCase, errors_of, joined, shift_of, uncertainty_of
+from elevon.diagnose.engine.case import (
+    LogCase,
+    allowed,
+    errors_of,
+    joined,
+    shift_of,
+    uncertainty_of,
+)
 from elevon.diagnose.engine.frame import stray_of
 from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
 
@@ -66,11 +73,34 @@ def refuting(
     std = np.hypot(np.sqrt(np.diag(wide)), stray_of(covariance, shifts))
     k = int(np.argmax(np.abs(left) / std))
     if abs(left[k]) < REFUTED * std[k]:
-        return None
+        return _implausible(cases, faults)
     values = np.concatenate([case.features.values for case in cases])
     limit = values[k] - left[k] + REFUTED * np.sign(left[k]) * std[k]
     name = [name for case in cases for name in case.unit.names][k]
     return Reason(name, float(values[k]), float(limit))
+
+
+def _implausible(
+    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
+) -> Reason | None:
+    """Return what faults are not looked for by and leave more than `REFUTED` deviations of."""
+    if all(np.abs(case.plausible.score).max(initial=0.0) < REFUTED for case in cases):
+        return None
+    wide = np.hypot(1.0, allowed(cases, [faults], [True])[0])
+    at = 0
+    for case in cases:
+        plausible = case.plausible
+        loose = wide[at : at + len(plausible.names)]
+        score = np.abs(plausible.score) / loose
+        at += len(loose)
+        if len(score) and score.max() >= REFUTED:
+            k = int(np.argmax(score))
+            limit = (
+                plausible.mean[k]
+                + REFUTED * loose[k] * np.sign(plausible.score[k]) * plausible.std[k]
+            )
+            return Reason(plausible.names[k], float(plausible.values[k]), float(limit))
+    return None
 
 
 def _sum(cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]) -> Floats:
@@ -242,4 +272,23 @@ def moved(
                     float(explained[k]),
                 )
             )
+        out += _moved_plausibility(case)
     return tuple(out)
+
+
+def _moved_plausibility(case: LogCase) -> list[Moved]:
+    """What no candidate moves and has moved."""
+    plausible = case.plausible
+    rows = zip(
+        plausible.names,
+        plausible.units,
+        plausible.values,
+        plausible.mean,
+        plausible.std,
+        strict=True,
+    )
+    return [
+        Moved(case.name, name, unit, float(value), float(mean), float(std), 0.0)
+        for name, unit, value, mean, std in rows
+        if abs(value - mean) > SEEN * std
+    ]

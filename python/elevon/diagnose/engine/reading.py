@@ -104,6 +104,20 @@ class Reading(ABC):
     def table(self) -> FeatureTable:
         """Its features' records."""
 
+    @property
+    def plausible(self) -> FeatureVector:
+        """What the log shows beside its features and no candidate moves."""
+        return FeatureVector((), np.zeros(0), np.zeros(0))
+
+    @property
+    def plausible_table(self) -> FeatureTable:
+        """Records of that."""
+        return {}
+
+    def plausible_of(self, units: Sequence[ReplayUnit]) -> list[FeatureVector]:
+        """Return the same of units that run the test."""
+        return [FeatureVector((), np.zeros(0), np.zeros(0)) for _ in units]
+
     @abstractmethod
     def digest(self) -> bytes:
         """Of all that its model runs depend on."""

@@ -146,8 +146,10 @@ def _opening(key: str) -> str:
 
 def _spoken(name: str) -> str:
     from elevon.diagnose.positions.features import FEATURES
+    from elevon.diagnose.positions.plausibility import PLAUSIBLE
 
-    return f"{name} ({FEATURES[name].text})" if name in FEATURES else name
+    known = {**FEATURES, **PLAUSIBLE}
+    return f"{name} ({known[name].text})" if name in known else name
 
 
 def _labelled(cause: Cause) -> str:

@@ -75,9 +75,9 @@ FEATURES = _table(
             (0.0, 0.002), (0.0, 0.006), 0.40, "size"),
 )  # fmt: skip
 _BLOCKS = 16  # stretches of a log whose scores give the deviations
-_LEAST = 100  # samples of a regression
-_SLOW = 0.1  # of the highest speed
-_SMOOTH = 0.02  # s of the difference that gives the acceleration
+LEAST = 100  # samples of a regression
+SLOW = 0.1  # of the highest speed
+SMOOTH = 0.02  # s of the difference that gives the acceleration
 _BRAKE = 8  # place of the brake torque among the columns that explain the current
 
 
@@ -110,7 +110,7 @@ def features_of(
         Whether what turns with the shaft is sought.
     """
     width = median(np.diff(signals.time))
-    moving = signals.good & (np.abs(signals.speed) > _SLOW * np.abs(signals.speed).max())
+    moving = signals.good & (np.abs(signals.speed) > SLOW * np.abs(signals.speed).max())
     rows, flies = _positions(signals, moving, ratio, deviations)
     cosine, sine = np.cos(pole_pairs * signals.motor), np.sin(pole_pairs * signals.motor)
     waves = (cosine, sine, cosine**2 - sine**2, 2.0 * cosine * sine)
@@ -206,7 +206,7 @@ def _positions(
     """Lost motion and scale, and whether the output flies in its backlash on its own."""
     gap = signals.motor / ratio - signals.output
     use = moving & carried(signals.motor / ratio, float(np.ptp(gap[moving])))
-    if use.sum() < _LEAST:
+    if use.sum() < LEAST:
         use = moving
     centred = signals.output - float(np.mean(signals.output[use]))
     columns = [np.sign(signals.speed), centred, np.ones_like(gap)]
@@ -225,10 +225,10 @@ _Turns = tuple[Sequence[Floats], Floats | None]
 def _currents(
     signals: Log, moving: Bools, turns: _Turns, width: float, deviations: bool
 ) -> dict[str, tuple[float, float]]:
-    half = max(1, round(0.5 * _SMOOTH / width))
-    rate = _slope(signals.speed, half) / width
+    half = max(1, round(0.5 * SMOOTH / width))
+    rate = local_slope(signals.speed, half) / width
     way = np.sign(signals.speed)
-    level = _mean(signals.current, 8 * half)
+    level = local_mean(signals.current, 8 * half)
     columns = [way, signals.speed, rate, np.ones_like(way)]
     columns += [level * wave for wave in turns[0]]
     brake = signals.brake.at(signals.time)
@@ -253,13 +253,13 @@ def _currents(
     return rows
 
 
-def _slope(values: Floats, half: int) -> Floats:
+def local_slope(values: Floats, half: int) -> Floats:
     """Mean slope over `half` samples either way, per sample."""
     padded = np.pad(values, half, mode="edge")
     return np.asarray((padded[2 * half :] - padded[: -2 * half]) / (2.0 * half), dtype=np.float64)
 
 
-def _mean(values: Floats, half: int) -> Floats:
+def local_mean(values: Floats, half: int) -> Floats:
     """Mean over `half` samples either way."""
     total = np.concatenate(([0.0], np.cumsum(np.pad(values, half, mode="edge"))))
     width = 2 * half + 1
@@ -271,7 +271,7 @@ def _voltages(
 ) -> dict[str, tuple[float, float]]:
     voltage = signals["torque_voltage"]
     use = moving & np.isfinite(voltage)
-    if use.sum() < 2 * _LEAST:
+    if use.sum() < 2 * LEAST:
         return {}
     columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
     columns += [signals.speed * wave for wave in turns[0]]

@@ -18,6 +18,7 @@ from elevon.diagnose.engine.reading import Days, DrawnSignal, Reading, ReplayUni
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector
 from elevon.diagnose.positions.features import FEATURES, features_of
 from elevon.diagnose.positions.log import LONGEST, RUN_IN, prepared
+from elevon.diagnose.positions.plausibility import PLAUSIBLE, plausibility_of
 from elevon.experiment import Experiment, Inputs, Variant
 from elevon.simulate.prepare import solver_step
 from elevon.units import to_display
@@ -107,6 +108,25 @@ class PositionReading(Reading):
     def features(self) -> FeatureVector:
         """What the log shows."""
         return logged_features(self.log.without("command"), self.actuator)
+
+    @cached_property
+    def plausible(self) -> FeatureVector:
+        """What the log shows beside that and no candidate moves."""
+        return self._plausible(self.log)
+
+    def _plausible(self, log: Log) -> FeatureVector:
+        value = self.actuator.parameters.value
+        ratio, pole_pairs = value("gear.ratio"), value("motor.pole_pairs")
+        return plausibility_of(log, ratio=ratio, pole_pairs=pole_pairs)
+
+    def plausible_of(self, units: Sequence[ReplayUnit]) -> list[FeatureVector]:
+        """Return the same of units that run the test."""
+        return [self._plausible(run) for run in self._runs(units)]
+
+    @property
+    def plausible_table(self) -> FeatureTable:
+        """Records of that."""
+        return PLAUSIBLE
 
     @property
     def table(self) -> FeatureTable:
