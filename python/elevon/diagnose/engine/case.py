@@ -221,18 +221,14 @@ def detector_of(
         rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
         both += [False] * len(rows[-1])
     degrees = min(case.unit.degrees for case in cases)
-    draws = _drawn(cases) @ root.T if any(case.unit.learned for case in cases) else None
+    draws = _drawn(cases) @ root.T
     return residual, root, Detector(np.vstack(rows), both, degrees, ANYWHERE, draws)
 
 
 def _drawn(cases: Sequence[LogCase]) -> Floats:
     """Draws of healthy logs' deviations, with what is not known of their spread."""
     rng = np.random.default_rng(15)
-    parts = []
-    for case in cases:
-        noise = rng.standard_normal((DRAWS, len(case.unit.names))) * case.features.std
-        parts.append(case.unit.drawn(DRAWS, rng) + noise)
-    return np.hstack(parts)
+    return np.hstack([case.unit.drawn(DRAWS, case.features.std, rng) for case in cases])
 
 
 def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:

@@ -6,13 +6,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.replay import Replay
-from elevon.diagnose.engine.spread import LearnedSpread
+from elevon.diagnose.engine.spread import LearnedSpread, StepVariance, stated
 from elevon.diagnose.engine.table import Feature, FeatureVector, deviations
 
 _FAR = 2.0  # deviations
+Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -36,10 +38,12 @@ class Healthy:
     offset : ndarray, shape (k, k)
         The part of the covariance that is the same in all logs of the unit: what is not known of
         how far it deviates from the model.
-    worth, offset_worth : ndarray, shape (k,)
-        Runs that the spread and the offset are known by.
-    learned : bool
-        Whether they were learnt.
+    steps : StepVariance
+        What is known of the spread's size.
+    offset_worth : ndarray, shape (k,)
+        Runs that the offset's size is known by, where it is no matter of the spread.
+    by_days : ndarray of bool, shape (k,)
+        Where baselines leave of the offset their own scatter, as large as the spread is.
     """
 
     names: tuple[str, ...]
@@ -49,20 +53,29 @@ class Healthy:
     baselines: int
     scale: Floats
     offset: Floats
-    worth: Floats
+    steps: StepVariance
     offset_worth: Floats
-    learned: bool = False
+    by_days: Bools
 
-    def drawn(self, count: int, rng: np.random.Generator) -> Floats:
-        """Draw a new log's deviations, shape (count, k), with what is not known of their sizes."""
-        out = np.zeros((count, len(self.mean)))
-        parts = ((self.covariance - self.offset, self.worth), (self.offset, self.offset_worth))
-        for covariance, worth in parts:
-            # The offset may be known to the last digit: what is left of it is no matrix to factor.
-            values, ways = np.linalg.eigh(covariance)
-            steps = rng.standard_normal(out.shape) * np.sqrt(np.maximum(values, 0.0))
-            out += steps @ ways.T / np.sqrt(rng.chisquare(worth, out.shape) / worth)
-        return out
+    def drawn(self, count: int, noise: Floats, rng: np.random.Generator) -> Floats:
+        """Draw a new log's deviations, shape (count, k), with what is not known of their sizes.
+
+        Its noise, shape (k,), is of a size as little known as the spread is.
+        """
+        factor, common = self.steps.drawn(count, rng)
+        offset = common * self.offset_worth / rng.chisquare(self.offset_worth, factor.shape)
+        offset = np.where(self.by_days, factor / self.scale**2, offset)
+        out = _correlated(self.covariance - self.offset, count, rng) / self.scale
+        out = (out + noise * rng.standard_normal(out.shape)) * np.sqrt(factor)
+        return np.asarray(out + _correlated(self.offset, count, rng) * np.sqrt(offset))
+
+
+def _correlated(covariance: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Draw of a normal distribution, shape (count, k)."""
+    # The offset may be known to the last digit: what is left of it is no matrix to factor.
+    values, ways = np.linalg.eigh(covariance)
+    steps = rng.standard_normal((count, len(values))) * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(steps @ ways.T)
 
 
 @dataclass(frozen=True)
@@ -84,9 +97,10 @@ def healthy(
 
     The offset of a unit from the model is Gaussian with each feature's mismatch; the mean of the
     baselines of the same test narrows it (or replaces it, where the model's mean is no prior),
-    those of other tests narrow what is pooled. The spread's
-    scale is that stated, worth `DEGREES` runs, or learnt, and the baselines' scatter. Where
-    baselines deviate further from the model than was assumed, the assumption yields.
+    those of other tests narrow what is pooled. The spread's scale is that stated, worth `STATED`
+    runs, times one that all features have in common (which baselines tell), or learnt, and the
+    baselines' scatter. Where baselines deviate further from the model than was assumed, the
+    assumption yields.
     """
     at, count = model.places(names), len(baselines)
     records = [model.table[name] for name in names]
@@ -95,29 +109,32 @@ def healthy(
         common_error = model.common_error[at]
     values = np.array([b.only(names).values for b in baselines]).reshape(count, len(at))
     level = values.mean(axis=0) if count else mean
-    known = (spread_known or LearnedSpread()).of(names)
+    known = stated(len(names)) if spread_known is None else spread_known.of(names)
     spread = model.spread[np.ix_(at, at)] + np.diag(deviations(records, level, "repeats") ** 2)
     spread *= np.sqrt(np.outer(known.days, known.days))
     off = np.diag(deviations(records, level, "mismatch") ** 2) + np.outer(
         common_error, common_error
     )
     off *= np.sqrt(np.outer(known.mismatch, known.mismatch))
-    scale, worth, offset_worth = np.ones(len(at)), known.worth, known.mismatch_worth
+    steps = StepVariance(known.worth, np.zeros(len(at)))
+    scale, by_days = np.ones(len(at)), np.zeros(len(at), dtype=np.bool_)
     left, moved = off, np.zeros(len(at))
     if count:
         residual = values - mean
         noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
         centre = residual.mean(axis=0)
         scatter = np.sum((residual - centre) ** 2, axis=0) / (np.diag(spread) + noise)
-        scale = (worth + scatter) / (worth + count - 1)
-        worth = worth + count - 1
+        alone = centre**2 / (np.diag(off) + (np.diag(spread) + noise) / count)
+        steps = StepVariance(known.worth, scatter, count - 1)
+        if spread_known is None:
+            steps = StepVariance.of(known.worth, scatter, count - 1, alone)
+        scale = steps.value
         spread *= np.sqrt(np.outer(scale, scale))
         of_mean = (spread + np.diag(noise)) / count
         off = _yielding(off, of_mean, centre)
         gain = off @ np.linalg.inv(off + of_mean)
         left, moved = (off - gain @ off, gain @ centre) if model.prior else (of_mean, centre)
-        # What baselines leave of the offset is their own scatter, as little known as the spread.
-        offset_worth = np.where(np.diag(of_mean) < np.diag(off), worth, offset_worth)
+        by_days = np.diag(of_mean) < np.diag(off)
     for k, offset, std in _pooled(records, mean, elsewhere):
         gain = left[:, k] / (left[k, k] + spread[k, k] + std**2)
         moved = moved + gain * (offset - moved[k])
@@ -125,8 +142,8 @@ def healthy(
     left = 0.5 * (left + left.T)
     degrees = model.degrees + max(count - 1, 0)
     return Healthy(
-        tuple(names), mean + moved, spread + left, degrees, count, np.sqrt(scale), left, worth,
-        offset_worth, spread_known is not None,
+        tuple(names), mean + moved, spread + left, degrees, count, np.sqrt(scale), left, steps,
+        known.mismatch_worth, by_days,
     )  # fmt: skip
 
 

@@ -22,6 +22,13 @@ from elevon.errors import FormatError
 from elevon.files import write_text
 
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, and of the stated mismatch, in runs
+#: ASSUMED: the same of a feature by itself, beside the factor that all features have in common.
+STATED = 20.0
+#: Density of the logarithm of the factor that all features' variances have in common falls with
+#: its root. ASSUMED: so flat that a few baselines decide; a factor below one is none, as the
+#: stated deviations are least ones.
+_FACTORS = np.geomspace(1.0, 100.0, 61)
+_FAR = 3.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is no matter of all
 FORMAT = "elevon-spread"
 _VERSION = 1
 _ENDS = (0.05, 0.95)
@@ -60,6 +67,68 @@ class KnownSpread(NamedTuple):
     worth: Floats
     mismatch: Floats
     mismatch_worth: Floats
+
+
+@dataclass(frozen=True)
+class StepVariance:
+    """Variances of a unit's steps from day to day over the stated ones: what is known of them.
+
+    Each feature's is a factor that all features have in common, times one of its own (scaled
+    inverse chi-square about one). Baselines tell both: few of them the common one well, as
+    every feature counts for it.
+
+    Attributes
+    ----------
+    worth : ndarray, shape (k,)
+        Runs that the prior of a feature's own factor is worth.
+    scatter : ndarray, shape (k,)
+        Sum of squares of the baselines about their mean, over the stated variance.
+    free : int
+        Its degrees of freedom.
+    common : ndarray, shape (m,)
+        Probability of each of `_FACTORS`; none: there is no common factor.
+    """
+
+    worth: Floats
+    scatter: Floats
+    free: int = 0
+    common: Floats = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    def of(cls, worth: Floats, scatter: Floats, free: int, alone: Floats) -> StepVariance:
+        """Weigh a common factor by baselines.
+
+        Parameters
+        ----------
+        worth, scatter, free
+            As above.
+        alone : ndarray, shape (k,)
+            Square of the baselines' mean less the model's, over its stated variance.
+        """
+        from scipy.stats import f as fisher
+
+        log = -0.5 * np.log(_FACTORS)
+        seen = [(alone, 1, np.minimum(worth, _FAR)), (scatter / max(free, 1), free, worth)]
+        for ratio, degrees, tail in seen if free else seen[:1]:
+            each = np.maximum(ratio, 1e-9) / _FACTORS[:, None]
+            log += np.sum(fisher.logpdf(each, degrees, tail) - np.log(_FACTORS)[:, None], axis=1)
+        weight = np.exp(log - log.max())
+        return cls(worth, scatter, free, weight / weight.sum())
+
+    @property
+    def value(self) -> Floats:
+        """The factors, shape (k,)."""
+        middle = 1.0 / float(np.sum(self.common / _FACTORS)) if len(self.common) else 1.0
+        return (self.worth * middle + self.scatter) / (self.worth + self.free)
+
+    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Draw factors, shape (count, k), and the common one of each draw, shape (count, 1)."""
+        common = np.ones((count, 1))
+        if len(self.common):
+            common = rng.choice(_FACTORS, (count, 1), p=self.common)
+        shape = (count, len(self.worth))
+        factor = (self.worth * common + self.scatter) / rng.chisquare(self.worth + self.free, shape)
+        return factor, common
 
 
 @dataclass(frozen=True)
@@ -168,6 +237,12 @@ class LearnedSpread:
             return cls(features=features, alone=alone, based=based, **data)
         except (TypeError, AttributeError, KeyError, ValueError) as error:
             raise FormatError(f"{path}: a key is missing or of another kind: {error}") from None
+
+
+def stated(count: int) -> KnownSpread:
+    """Return what is known of features whose spread was not learnt."""
+    one, worth = np.ones(count), np.full(count, STATED)
+    return KnownSpread(one, worth, one, worth)
 
 
 def needed(rate: float) -> int:

@@ -75,6 +75,10 @@ FEATURES = _table(
             (0.0, 0.002), (0.0, 0.006), 0.40, "size"),
 )  # fmt: skip
 _BLOCKS = 16  # stretches of a log whose scores give the deviations
+#: Share of what the voltage's regression leaves that may be in step with a column: the current
+#: controller answers its sensor's noise by voltage, and that repeats with the motion, so stretches
+#: of a log do not show it. ASSUMED: from units of another program whose speed is steady.
+_IN_STEP = 0.1
 LEAST = 100  # samples of a regression
 SLOW = 0.1  # of the highest speed
 SMOOTH = 0.02  # s of the difference that gives the acceleration
@@ -276,6 +280,9 @@ def _voltages(
     columns = [signals.speed, signals.current, np.ones_like(signals.speed)]
     columns += [signals.speed * wave for wave in turns[0]]
     fit = _fit(columns, voltage, use, deviations)
+    residual = voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
+    if deviations:
+        fit[1][np.diag_indices(2)] += _in_step(columns, residual, use)[:2] ** 2
     rows = {
         "voltage_per_speed": _one(fit, 0),
         "voltage_per_current": _one(fit, 1),
@@ -283,10 +290,19 @@ def _voltages(
         "voltage_order_2": _size(fit, 5, emf),
     }
     if turns[1] is not None:
-        residual = voltage - sum(b * c for b, c in zip(fit[0], columns, strict=True))
         sideband = [signals.speed * np.cos(turns[1]), signals.speed * np.sin(turns[1])]
         rows["voltage_sideband"] = _size(_fit(sideband, residual, use, deviations), 0, emf)
     return rows
+
+
+def _in_step(columns: Sequence[Floats], residual: Floats, use: Bools) -> Floats:
+    """Deviation of each weight, shape (k,), where a share of the residual is in step with it."""
+    rows = np.stack(columns)[:, use]
+    gram = rows @ rows.T / rows.shape[1]
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    inverse = np.linalg.pinv(gram / np.outer(scale, scale), 1e-10, hermitian=True)
+    size = _IN_STEP * float(np.std(residual[use]))
+    return np.asarray(size * np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale)
 
 
 def _control(signals: Log, width: float, deviations: bool) -> dict[str, tuple[float, float]]:
