@@ -1,5 +1,6 @@
 """Sphinx's settings; `build.py` prepares the folder that it reads."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -74,8 +75,29 @@ html_theme_options = {
 }
 
 
+def each_by_itself(_app, _what, _name, _thing, _options, lines):
+    """Write `a, b : float` as two entries: under Attributes napoleon takes it for one."""
+    if "Attributes" not in lines:
+        return
+    start = lines.index("Attributes")
+    found, index = lines[:start], start
+    while index < len(lines):
+        end = index + 1
+        while end < len(lines) and lines[end].startswith("    "):
+            end += 1
+        several = re.fullmatch(r"(\w+(?:, \w+)+) : (.*)", lines[index])
+        heads = (
+            [f"{n} : {several[2]}" for n in several[1].split(", ")] if several else [lines[index]]
+        )
+        for head in heads:
+            found += [head, *lines[index + 1 : end]]
+        index = end
+    lines[:] = found
+
+
 def setup(app):
     """Formulas as MathML: they need no script and no network, and are read aloud."""
+    app.connect("autodoc-process-docstring", each_by_itself, priority=400)
     app.add_html_math_renderer(
         "mathml", inline_renderers=(mathml.inline, None), block_renderers=(mathml.block, None)
     )
