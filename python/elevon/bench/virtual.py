@@ -64,6 +64,8 @@ def traced(
         "output_position": signals["encoder_position"],
         "torque_voltage": signals["voltage_q_ref"],
     }
+    if "current_d_meas" in signals:
+        channels["direct_current"] = signals["current_d_meas"]
     brake = brake_of(cell_log, note, time, 0.0, channels["motor_speed"])
     return Log(setup.trace.name, time, channels, note=note, brake=brake)
 

@@ -14,6 +14,7 @@ from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.diagnose.engine.reading import ReplayUnit
 from elevon.diagnose.engine.soundness import check_sizes, unsound
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
+from elevon.diagnose.positions.closed_form import diagnose_by_form
 from elevon.diagnose.positions.reading import PositionReading
 from elevon.diagnose.roles.log import role_log
 from elevon.diagnose.stand_sensors import diagnose_sensors
@@ -92,6 +93,10 @@ def diagnose(
     """
     begin = clock.perf_counter()
     check_request(logs, false_alarm)
+    wanted = turns(actuator) and not faults
+    sign = diagnose_by_form(logs, baselines, actuator, false_alarm) if wanted else None
+    if sign is not None:
+        return replace(sign, seconds=clock.perf_counter() - begin)
     healthy = [reading_of(log, actuator) for log in baselines]
     items = [reading_of(log, actuator) for log in logs]
     broken = None if faults else _broken(logs, items, baselines, healthy, false_alarm)

@@ -39,7 +39,7 @@ _DEVIATIONS = 4.0
 _FOLLOWS = 0.2  # of a force's spread: what the cell of a healthy stand may miss it by
 _BLOCKS = 12  # stretches from which a regression's deviation is taken
 _FLAT = 0.2  # of the baseline's noise: below it a channel does not move
-_PROBABILITY = 0.999
+PROBABILITY = 0.999
 """Probability given to a contradiction of four deviations or more; ASSUMED."""
 _ISOLATED = (
     "a sensor of the stand contradicts another one of it, which no fault of the actuator does: "
@@ -237,28 +237,47 @@ def diagnose_sensors(
     suspects = {item.key: item for log in logs for item in suspects_of(log, baselines)}
     if not suspects:
         return None
-    causes = tuple(_cause(item) for item in suspects.values())
+    return contradiction(logs, [_cause(item) for item in suspects.values()], rate, _ISOLATED)
+
+
+def contradiction(
+    logs: Sequence[Log], causes: Sequence[Cause], rate: float, finding: str
+) -> Diagnosis:
+    """Return the answer that names causes by what channels of the logs say of each other.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        That were diagnosed.
+    causes : sequence of Cause
+        At least one.
+    rate : float
+        Of false alarms that was asked for.
+    finding : str
+        What the answer stands on.
+    """
     named = tuple(SuspectedFault(c.kind, c.place, c.severity, c.unit, c.interval) for c in causes)
+    keys = tuple(f"{c.kind}@{c.place}" for c in causes)
     return Diagnosis(
         logs=tuple(log.name for log in logs),
         status="faulty",
-        p_fault=_PROBABILITY,
+        p_fault=PROBABILITY,
         false_alarm=rate,
-        chance=1.0 - _PROBABILITY,
-        faults=causes,
-        best=tuple(suspects),
-        p_best=_PROBABILITY,
+        chance=1.0 - PROBABILITY,
+        faults=tuple(causes),
+        best=keys,
+        p_best=PROBABILITY,
         unobservable=(),
         detectable={},
         features=(),
-        findings=(_ISOLATED,),
+        findings=(finding,),
         seconds=0.0,
-        hypotheses=(Explanation(named, _PROBABILITY),),
-        severity_units={cause.key: cause.unit for cause in suspects.values()},
+        hypotheses=(Explanation(named, PROBABILITY),),
+        severity_units={key: cause.unit for key, cause in zip(keys, causes, strict=True)},
     )
 
 
 def _cause(item: SensorSuspect) -> Cause:
     both = (FaultPlace(item.kind, f"{PLACE}.{item.or_else}"),) if item.or_else else ()
     place = f"{PLACE}.{item.channel}"
-    return Cause(item.kind, place, item.unit, _PROBABILITY, item.size, item.interval, both)
+    return Cause(item.kind, place, item.unit, PROBABILITY, item.size, item.interval, both)

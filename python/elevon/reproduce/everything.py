@@ -237,9 +237,9 @@ def _run(
 
 def _check(entry: Mapping[str, Any]) -> Check:
     """Return a check as it was kept; a value that was not finite is null there."""
-    fields = {name: entry[name] for name in ("name", "limit", "unit", "at_least")}
-    value, other = entry["value"], {name: entry.get(name) for name in ("ours", "ours_unit")}
-    return Check(value=float("nan") if value is None else value, **other, **fields)
+    known = {name: value for name, value in entry.items() if name != "passed"}
+    value = entry["value"]
+    return Check(**known | {"value": float("nan") if value is None else value})
 
 
 def rows_of(record: Published, checks: Sequence[Check], link: str = "") -> list[IndexRow]:

@@ -59,8 +59,15 @@ def check_values(actuator: Actuator, fidelity: str) -> list[Notice]:
 
 
 def not_acting(actuator: Actuator, compiled: CompiledScenario, fidelity: str) -> list[Notice]:
-    """Return what the caller set away from neutral where it has no effect in this run."""
+    """Return what the caller set away from neutral where it has no effect in this run.
+
+    Raises
+    ------
+    NotActingError
+        A fault that has none at any fidelity: the run would be called faulty, and is healthy.
+    """
     if compiled.faults:
+        _refuse_inert(actuator, compiled)
         return _resting(actuator, compiled, fidelity)
     # Without faults the values alone decide: of many runs with the same ones it is looked up once.
     key = ("not acting", fidelity, compiled.command_mode)
@@ -104,6 +111,25 @@ def _reasons(
     for fault in faults:
         reasons.update(_of_fault(fault, actuator.wiring, idle))
     return reasons
+
+
+def _refuse_inert(actuator: Actuator, compiled: CompiledScenario) -> None:
+    """Refuse faults that change nothing with these values, whatever the fidelity."""
+    from elevon import _core
+
+    vector = _with_mode(actuator, compiled.command_mode)
+    for fault in compiled.faults:
+        record = find_record(fault["kind"], fault["place"], actuator.wiring)
+        paths = list(record.targets[fault["place"]])
+        idle: list[dict[str, str]] = []
+        for fidelity in record.fidelities if fault["severity"] != 0.0 else ():
+            rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults, paths)
+            idle.append({item["path"]: item["reason"] for item in rows})
+        if paths and idle and all(path in reasons for path in paths for reasons in idle):
+            name = f"fault {record.kind}@{fault['place']}"
+            raise NotActingError(
+                f"{name} has no effect in {actuator.name}: {paths[0]}: {idle[0][paths[0]]}"
+            )
 
 
 def _touched(fault: Mapping[str, Any], wiring: str) -> Iterator[str]:

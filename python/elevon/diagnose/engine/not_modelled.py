@@ -6,34 +6,48 @@ _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
 _SWITCHES = tuple(f"inverter.{p}_{side}" for p in "abc" for side in ("high", "low"))
 
+_FORM = "not in the reduced-order model; "
 _LOOP = (
+    f"{_FORM}a drive's log shows it by the current that the motor does not take, once or twice an "
+    "electrical turn: named with the other phases; a small one brakes like viscous friction and "
+    "unbalances the phases, so it is named lubrication@transmission with short@motor.phase_a (or "
+    "gain@sensor.current_a), or not explained"
+)
+_RESISTOR = (
     "the reduced-order model has no loop of its own for it: its current brakes like viscous "
     "friction and unbalances the phases, so it is named lubrication@transmission with "
     "short@motor.phase_a (or gain@sensor.current_a), or not explained"
 )
 _OPEN = (
-    "with it the unit hardly moves, and such a log is refused; where it still moves, what the "
-    "motor does is not in the reduced-order model: not explained, or a short@motor.phase_a is named"
+    f"{_FORM}where all current is asked for and none flows it is named with the other phases, or "
+    "with connector_open@supply, open_phase@motor.phase_a and open_switch@inverter.a_high where no "
+    "field current was logged; else refused, not explained, or a short@motor.phase_a is named"
 )
 _DRY = "on the whole it adds dry friction and is named friction@transmission"
 _ANGLE = (
-    "it shifts or distorts the angle that the drive commutates by: less torque for the current "
-    "(named demagnetisation@motor where it is much), else nothing visible in these tests"
+    f"{_FORM}an error once or twice a turn of the shaft stands in the difference of the two "
+    "positions: named as channel_offset@sensor.resolver.sine or "
+    "resolver_short@sensor.resolver.sine with those that look alike; a constant one gives less "
+    "torque for the current (named demagnetisation@motor where it is much), else nothing visible"
 )
 _COUNTS = (
-    "counts that are lost in one place shift the position in steps, which no feature "
-    "follows: refused as another gear ratio where many are lost, else not seen"
+    f"{_FORM}an output position that is too short in whole counts: named "
+    "missing_counts@sensor.encoder or, where it goes in steps, dark_sectors@sensor.encoder; "
+    "refused as another gear ratio where many are lost, not seen below 0.2 %"
 )
-_GONE = "without that signal there is no motion, or none both ways: such a log is refused"
+_GONE = (
+    f"{_FORM}where the drive asks for all current and the shaft seems to stand, it is named "
+    "resolver_open@sensor.resolver.sine with those that look alike, or jam@transmission where the "
+    "output stands, too; else such a log is refused"
+)
 
 #: Kind and places to the reason; what it may be named stands in it as ``KIND@PLACE``.
 _NOT_MODELLED: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("open_phase", _PHASES, _OPEN),
     ("open_switch", _SWITCHES, _OPEN),
-    ("shorted_switch", _SWITCHES, "the drive trips, and a log without motion is refused"),
-    ("connector_open", ("supply",), "the link empties as soon as the motor draws from it: the unit "
-     "hardly moves, and such a log is refused or not explained"),
-    ("resistor_short", _PHASES, _LOOP),
+    ("shorted_switch", _SWITCHES, "the drive trips: nothing flows, as with connector_open@supply"),
+    ("connector_open", ("supply",), _OPEN),
+    ("resistor_short", _PHASES, _RESISTOR),
     ("phase_short", tuple(f"motor.phases_{p}" for p in ("ab", "bc", "ca")), _LOOP),
     ("ground_short", _PHASES, _LOOP),
     ("offset", _CURRENTS, "it moves the current once a turn of the electrical angle, by as much "
@@ -42,12 +56,12 @@ _NOT_MODELLED: tuple[tuple[str, tuple[str, ...], str], ...] = (
      "gain@sensor.current_a"),
     ("dead", _CURRENTS, "a gain of nothing: beyond the range tried of gain@sensor.current_a, which "
      "is named, or not explained"),
-    ("bearing", ("bearing.cage",), f"{_DRY}; how that changes once a turn of the cage is not "
-     "looked for"),
+    ("bearing", ("bearing.cage",), f"{_FORM}friction once a turn of the cage is named; where "
+     f"it is small, {_DRY}"),
     ("stator_rub", ("motor",), f"{_DRY}; how that changes once a turn of the shaft is not looked "
      "for"),
-    ("jam", ("transmission",), f"{_DRY}, or not explained where it is more than a motor still "
-     "moves with"),
+    ("jam", ("transmission",), f"{_DRY}, or not explained where a motor hardly moves; where "
+     "all current flows and nothing moves it is named with resolver_open@sensor.resolver.sine"),
     ("chipped_tooth", ("gear",), "a step once a turn of a wheel, which no feature follows: "
      "not seen, or named tooth_wear@gear or backlash@transmission"),
     ("offset", ("sensor.encoder",), "no test looks at absolute positions"),

@@ -86,8 +86,8 @@ def _named(cause: Cause) -> str:
         return _labelled(cause)
     value, low, high = severity_texts(cause.severity, cause.interval, cause.unit)
     sign = "+" if cause.severity > 0.0 else ""
-    low = low.rpartition(" ")[0]
-    high = high.rpartition(" ")[0]
+    low = low.partition(" ")[0]
+    high = high.partition(" ")[0]
     return f"{cause.kind.replace('_', ' ')} {sign}{value} ({low} to {high})"
 
 

@@ -41,8 +41,9 @@ LINES = (
     (CONNECTOR, "open pin or lead wire", "connector_open@supply=1"),
 )
 """Component, failure mode, fault: severities ASSUMED, plainly visible ones."""
-HEALTHY, NAMED, REFUSED, UNEXPLAINED, OTHER = (
-    "called healthy", "named", "refused: nothing moves", "unknown fault", "another is named",
+HEALTHY, NAMED, ALIKE, REFUSED, UNEXPLAINED, OTHER = (
+    "called healthy", "named", "named with those that look alike", "refused: nothing moves",
+    "unknown fault", "another is named",
 )  # fmt: skip
 
 
@@ -77,7 +78,7 @@ class FmecaResult(CheckedResult):
     def checks(self) -> list[Check]:
         """Each line acts; none is passed as healthy, none named as another; the healthy log is."""
         count = {name: sum(row.seen == name for row in self.rows) for name in (HEALTHY, OTHER)}
-        named = sum(row.seen == NAMED for row in self.rows)
+        named = sum(row.seen in (NAMED, ALIKE) for row in self.rows)
         return [
             Check("least change of a line", min(row.change_percent for row in self.rows),
                   LEAST_CHANGE, "%", at_least=True),
@@ -161,5 +162,11 @@ def _answer(log: Log, unit: Actuator, baseline: Log, fault: str) -> tuple[str, s
         return HEALTHY, answer.headline
     if answer.status != "faulty":
         return UNEXPLAINED, answer.headline
-    kinds = {name.partition("@")[0] for name in answer.best}
-    return (NAMED if kinds == {fault.partition("@")[0]} else OTHER), answer.headline
+    key = fault.partition("=")[0]
+    causes = [cause for cause in answer.faults if f"{cause.kind}@{cause.place}" in answer.best]
+    alike = [place.key for cause in causes for place in cause.ambiguous_with]
+    text = answer.headline + (f"; alike: {', '.join(alike)}" if alike else "")
+    if len(causes) != 1 or key not in (*answer.best, *alike):
+        return OTHER, text
+    # Places of one kind differ by a phase that no log without the angle's zero tells.
+    return (ALIKE if any(not name.startswith(causes[0].kind) for name in alike) else NAMED), text

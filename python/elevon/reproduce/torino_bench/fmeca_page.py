@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
-from elevon.reproduce.torino_bench.fmeca import NAMED, FmecaResult
+from elevon.reproduce.torino_bench.fmeca import ALIKE, NAMED, FmecaResult
 
 
 def fmeca_page(result: FmecaResult, *, date: str | None = None) -> Report:
     """Return the report of `elevon reproduce torino-fmeca`."""
-    named = sum(row.seen == NAMED for row in result.rows)
+    named = sum(row.seen in (NAMED, ALIKE) for row in result.rows)
     report = Report(
         "Failure modes of an actuator, and what diagnosis sees of them",
         f"Each line of the printed table as faults of the catalogue, one log of 20 s each. "
