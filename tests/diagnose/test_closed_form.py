@@ -29,14 +29,14 @@ def log(*, error=None, lost=0.0, scale=1.0, leak=None, drag=0.0, **channels):
     way = np.sign(speed)
     current = 1.2 * way + 0.004 * speed + drag * way * (1.0 + np.cos(0.381 * shaft + 0.7))
     current += 0.05 * rng.standard_normal(len(time))
-    asked = current + 0.1 * rng.standard_normal(len(time))
+    target = current + 0.1 * rng.standard_normal(len(time))
     if leak is not None:
-        asked = asked + leak(PAIRS * shaft)
+        target = target + leak(PAIRS * shaft)
     seen = shaft + (error(shaft) if error is not None else 0.0)
     values = {
         "motor_position": seen,
         "output_position": np.floor(output * (1.0 - lost) / COUNT) * COUNT * scale,
-        "motor_speed": speed, "speed_ref": speed, "torque_current": current, "current_ref": asked,
+        "motor_speed": speed, "speed_ref": speed, "torque_current": current, "current_ref": target,
     } | {role: np.full(len(time), value) for role, value in channels.items()}  # fmt: skip
     return Log("made", time, values)
 
@@ -109,17 +109,22 @@ def test_which_circuit_is_open_by_where_the_current_did_flow(unit, way, kind):
     cut = made.with_channels(direct_current=vector.real, torque_current=vector.imag * flows * 0.4)
     if way:
         cut = made.with_channels(direct_current=vector.real, torque_current=vector.imag)
-    asked = np.where(flows, 1.0, 22.5)
-    cause = named(unit, cut.with_channels(current_ref=asked))
+    target = np.where(flows, 1.0, 22.5)
+    cause = named(unit, cut.with_channels(current_ref=target))
     assert cause.kind == kind
 
 
 def test_a_standing_shaft_is_a_jam_or_a_resolver_without_a_signal(unit):
-    held = {"motor_position": 1.0, "motor_speed": 0.0, "current_ref": 22.5, "torque_current": 22.4}
-    jam = named(unit, log(output_position=0.0, **held))
+    standing = {
+        "motor_position": 1.0,
+        "motor_speed": 0.0,
+        "current_ref": 22.5,
+        "torque_current": 22.4,
+    }
+    jam = named(unit, log(output_position=0.0, **standing))
     assert jam.kind == "jam"
     assert ("resolver_open", "sensor.resolver.sine") in jam.ambiguous_with
-    moved = log(**held)
+    moved = log(**standing)
     assert named(unit, moved).kind == "resolver_open"
 
 

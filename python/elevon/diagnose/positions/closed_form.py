@@ -42,12 +42,12 @@ LOST = 0.002
 """Least share of lost counts that is told: twice what a gear's ratio may seem off by."""
 FORM = 0.02
 """Deviation of a size that is read by a closed form, over it."""
-_ASKED = 0.8  # of the current limit: the drive asks for all it has
+_FULL = 0.8  # of the current limit: the drive asks for all it has
 _LONG = 0.2  # of a log
 _NOTHING = 0.02  # of the current asked for: nothing flows
 _ALL = 0.9  # of it: it flows as asked
 _STANDS = 0.01  # rad of the motor's shaft that a standing one may seem to move by
-_HELD = 2.0  # counts by which the output moves while the shaft seems to stand
+_CREEP = 2.0  # counts by which the output moves while the shaft seems to stand
 _WHOLE = 0.03  # of a count
 _SMOOTH = 0.02  # s of the mean that gives the acceleration
 _STEPS = 0.05  # deviation over size of what is lost
@@ -154,9 +154,9 @@ def diagnose_by_form(
 
 def cause_of(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
     """Return what a log shows by its closed form; None: nothing of the kind."""
-    asked = np.abs(item.log["current_ref"]) > _ASKED * item.value("control.current_limit")
-    if (item.use & asked).sum() > _LONG * item.use.sum():
-        return _at_the_limit(item, item.use & asked)
+    full = np.abs(item.log["current_ref"]) > _FULL * item.value("control.current_limit")
+    if (item.use & full).sum() > _LONG * item.use.sum():
+        return _at_the_limit(item, item.use & full)
     if item.moving.sum() < _LEAST or item.moved("motor_position") < 4.0 * math.pi:
         return None
     return (
@@ -165,11 +165,11 @@ def cause_of(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
     )  # fmt: skip
 
 
-def _at_the_limit(item: DriveLog, asked: Bools) -> Cause | None:
+def _at_the_limit(item: DriveLog, full: Bools) -> Cause | None:
     """All is asked for: either nothing flows, or all of it does and the shaft seems to stand."""
     log = item.log
-    size = float(np.mean(np.abs(log["torque_current"][asked])))
-    wanted = float(np.mean(np.abs(log["current_ref"][asked])))
+    size = float(np.mean(np.abs(log["torque_current"][full])))
+    wanted = float(np.mean(np.abs(log["current_ref"][full])))
     if size < _NOTHING * wanted:
         return _interrupted(item)
     shaft = log["motor_position"][item.present]  # one channel alone tells a half of the turn
@@ -178,7 +178,7 @@ def _at_the_limit(item: DriveLog, asked: Bools) -> Cause | None:
         return None
     resolver = [("resolver_open", winding) for winding in _WINDINGS]
     resolver.append(("stuck", "sensor.resolver"))
-    if item.moved("output_position") > _HELD * item.count:
+    if item.moved("output_position") > _CREEP * item.count:
         return _cause(*resolver[0], resolver[1:])
     return _cause("jam", "transmission", resolver, unit="N m", there=False)
 
@@ -231,9 +231,12 @@ def _contact(item: DriveLog) -> Cause | None:
     speed = log["motor_speed"][moving]
     turn = item.value("motor.pole_pairs") * log["motor_position"][moving]
     shape = speed / float(np.abs(speed).max())
-    rest = [np.sign(speed), shape, np.ones_like(shape)]
+    trend = [np.sign(speed), shape, np.ones_like(shape)]
     waves = [f(k * turn) for k in (1, 2) for f in (np.cos, np.sin)]
-    columns = [*rest, *(wave * weight for wave in waves for weight in (np.ones_like(shape), shape))]
+    columns = [
+        *trend,
+        *(wave * weight for wave in waves for weight in (np.ones_like(shape), shape)),
+    ]
     weights, _ = regress(columns, part)
     once, twice = (
         float(np.sqrt(np.mean(sum(weights[k] * columns[k] for k in range(at, at + 4)) ** 2)))
