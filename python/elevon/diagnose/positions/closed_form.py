@@ -311,8 +311,8 @@ def _cage(item: DriveLog) -> Cause | None:
     """Friction once a turn of the cage of the motor's bearing, at the order of its geometry."""
     log, moving = item.log, item.moving
     value = item.value
-    lean = value("bearing.ball_diameter") / value("bearing.pitch_diameter")
-    order = 0.5 * (1.0 - lean * math.cos(value("bearing.contact_angle")))
+    gamma = value("bearing.ball_diameter") / value("bearing.pitch_diameter")
+    order = 0.5 * (1.0 - gamma * math.cos(value("bearing.contact_angle")))
     current, speed = log["torque_current"], log["motor_speed"]
     half = max(1, round(_SMOOTH / log.period))
     rate = np.gradient(np.convolve(speed, np.ones(half) / half, "same"), log.time)
