@@ -39,7 +39,8 @@ def check_sizes(log: Log, actuator: Actuator) -> None:
         ratio = known.value("gear.ratio") if "gear.ratio" in known else 1.0
         stated = ratio / known.value("screw.lead")
         travels = [float(np.nanstd(log[r])) for r in ("motor_position", "output_position")]
-        seen = travels[0] / travels[1] if travels[1] > 0.0 else stated
+        # A sensor that stands still is a fault for diagnosis, no column of another signal.
+        seen = travels[0] / travels[1] if min(travels) > 0.0 else stated
         if not 1.0 / _APART < seen / stated < _APART:
             raise InputError(
                 f"{log.name}: the motor turns {seen:.4g} rad a metre of the output, "
