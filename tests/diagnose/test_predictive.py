@@ -76,7 +76,7 @@ def test_draws_of_the_difference_of_two_days_follow_student():
     model = model_of(2)
     zero = FeatureVector(model.healthy.names, np.zeros(2), np.zeros(2))
     unit = healthy(model, model.healthy.names, [zero], spread_known=LearnedSpread())
-    draws = unit.drawn(20_000, np.zeros(2), np.random.default_rng(2))[:, 0]
+    draws = unit.drawn(20_000, np.zeros(2), 2)[:, 0]
     size = math.sqrt(float(unit.covariance[0, 0]))
     for level in (0.90, 0.95, 0.99):
         inside = np.mean(np.abs(draws) < size * student.ppf(0.5 + 0.5 * level, DEGREES))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -84,17 +85,23 @@ class LogCase:
 
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities, shape (m,), do to this unit's features, shape (m, k)."""
-        at = self.model.places(self.unit.names)
+        at, sizes, level, factor = self._unit_ways
         out = self.model.shift(key, severity)[:, at]
-        for k, name in enumerate(self.unit.names):
-            kind, unit_value = self.model.table[name].kind, float(self.unit.mean[k])
-            if kind == "size":
-                out[:, k] = np.hypot(max(unit_value, 0.0), out[:, k]) - max(unit_value, 0.0)
-            elif kind == "share":
-                of_model = float(self.model.healthy.values[at[k]])
-                if unit_value * of_model > 0.0:
-                    out[:, k] *= min(max(unit_value / of_model, 1.0 / _SHARE), _SHARE)
+        out[:, sizes] = np.hypot(level, out[:, sizes]) - level
+        out *= factor
         return out
+
+    @cached_property
+    def _unit_ways(self) -> tuple[list[int], list[int], Floats, Floats]:
+        """Places of features in the model; those of sizes, and their values; factors of shares."""
+        at, mean = self.model.places(self.unit.names), self.unit.mean
+        kinds = [self.model.table[name].kind for name in self.unit.names]
+        sizes = [k for k, kind in enumerate(kinds) if kind == "size"]
+        of_model = self.model.healthy.values[at]
+        shares = np.array([kind == "share" for kind in kinds]) & (mean * of_model > 0.0)
+        factor = np.ones(len(at))
+        factor[shares] = np.clip(mean[shares] / of_model[shares], 1.0 / _SHARE, _SHARE)
+        return at, sizes, np.maximum(mean[sizes], 0.0), factor
 
     def uncertainty(self, key: str, severity: float) -> Floats:
         """Return the deviation that a severity gives this unit's features, shape (k,)."""
@@ -227,8 +234,8 @@ def detector_of(
 
 def _drawn(cases: Sequence[LogCase]) -> Floats:
     """Draws of healthy logs' deviations, with what is not known of their spread."""
-    rng = np.random.default_rng(15)
-    return np.hstack([case.unit.drawn(DRAWS, case.features.std, rng) for case in cases])
+    parts = [c.unit.drawn(DRAWS, c.features.std, 15 + k) for k, c in enumerate(cases)]
+    return np.hstack(parts)
 
 
 def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:

@@ -46,8 +46,9 @@ class Detector:
         self._both = np.array(both)[seen]
         self._degrees, self._anywhere = degrees, anywhere
         healthy = _student(directions.shape[1], degrees) if draws is None else draws
-        self._ratios = np.sort(self.ratio(healthy))
-        self._healthy = np.sort(self.score(healthy)) if anywhere else self._ratios
+        ratios = self.ratio(healthy)
+        self._ratios = np.sort(ratios)
+        self._healthy = np.sort(self._score(healthy, ratios)) if anywhere else self._ratios
 
     def ratio(self, residual: Floats) -> Floats:
         """Log likelihood ratio of whitened features, shape (m, k) to (m,)."""
@@ -68,9 +69,11 @@ class Detector:
         The ratio, where nothing is set aside for other directions; else less the log of a chance.
         The squared length over k follows Fisher's distribution.
         """
+        return self._score(residual, self.ratio(residual))
+
+    def _score(self, residual: Floats, ratio: Floats) -> Floats:
         from scipy.stats import f as fisher
 
-        ratio = self.ratio(residual)
         if not self._anywhere:
             return ratio
         above = len(self._ratios) - np.searchsorted(self._ratios, ratio)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.diagnose.engine.draws import chi_square, normal
 from elevon.diagnose.engine.replay import Replay
 from elevon.diagnose.engine.spread import LearnedSpread, StepVariance, stated
 from elevon.diagnose.engine.table import Feature, FeatureVector, deviations
@@ -57,25 +58,29 @@ class Healthy:
     offset_worth: Floats
     by_days: Bools
 
-    def drawn(self, count: int, noise: Floats, rng: np.random.Generator) -> Floats:
+    def drawn(self, count: int, noise: Floats, seed: int) -> Floats:
         """Draw a new log's deviations, shape (count, k), with what is not known of their sizes.
 
-        Its noise, shape (k,), is of a size as little known as the spread is.
+        Its noise, shape (k,), is of a size as little known as the spread is. Another seed gives
+        other draws.
         """
-        factor, common = self.steps.drawn(count, rng)
-        offset = common * self.offset_worth / rng.chisquare(self.offset_worth, factor.shape)
-        offset = np.where(self.by_days, factor / self.scale**2, offset)
-        out = _correlated(self.covariance - self.offset, count, rng) / self.scale
-        out = (out + noise * rng.standard_normal(out.shape)) * np.sqrt(factor)
-        return np.asarray(out + _correlated(self.offset, count, rng) * np.sqrt(offset))
+        factor, common = self.steps.drawn(count, seed)
+        step = self.covariance - self.offset
+        step = step / np.outer(self.scale, self.scale) + np.diag(noise**2)
+        out = _correlated(step, count, (seed, 3)) * np.sqrt(factor)
+        square = chi_square(count, tuple(self.offset_worth.tolist()), (seed, 2))
+        size = np.sqrt(common * self.offset_worth / square)
+        size[:, self.by_days] = np.sqrt(factor[:, self.by_days]) / self.scale[self.by_days]
+        out += _correlated(self.offset, count, (seed, 4)) * size
+        return out
 
 
-def _correlated(covariance: Floats, count: int, rng: np.random.Generator) -> Floats:
+def _correlated(covariance: Floats, count: int, seed: tuple[int, ...]) -> Floats:
     """Draw of a normal distribution, shape (count, k)."""
     # The offset may be known to the last digit: what is left of it is no matrix to factor.
     values, ways = np.linalg.eigh(covariance)
-    steps = rng.standard_normal((count, len(values))) * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(steps @ ways.T)
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * ways.T
+    return np.asarray(normal(count, len(values), seed) @ root)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.diagnose.engine.draws import chi_square, uniform
 from elevon.documents import Document, read_toml
 from elevon.errors import FormatError
 from elevon.files import write_text
@@ -121,14 +122,14 @@ class StepVariance:
         middle = 1.0 / float(np.sum(self.common / _FACTORS)) if len(self.common) else 1.0
         return (self.worth * middle + self.scatter) / (self.worth + self.free)
 
-    def drawn(self, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    def drawn(self, count: int, seed: int) -> tuple[Floats, Floats]:
         """Draw factors, shape (count, k), and the common one of each draw, shape (count, 1)."""
         common = np.ones((count, 1))
         if len(self.common):
-            common = rng.choice(_FACTORS, (count, 1), p=self.common)
-        shape = (count, len(self.worth))
-        factor = (self.worth * common + self.scatter) / rng.chisquare(self.worth + self.free, shape)
-        return factor, common
+            at = np.searchsorted(np.cumsum(self.common), uniform(count, (seed, 0)))
+            common = _FACTORS[np.minimum(at, len(_FACTORS) - 1)][:, None]
+        square = chi_square(count, tuple((self.worth + self.free).tolist()), (seed, 1))
+        return (self.worth * common + self.scatter) / square, common
 
 
 @dataclass(frozen=True)
