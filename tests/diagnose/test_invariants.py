@@ -100,6 +100,18 @@ def test_swapped_positions_are_refused(case):
         diagnose([swapped], actuator, faults=few)
 
 
+def test_a_swapped_speed_and_current_are_refused(case):
+    actuator, few, logs = case
+    log, role = logs[0], current(logs[0])
+    if not log.has("motor_position", "motor_speed"):
+        pytest.skip("its logs have no position and speed of the motor")
+    size = 0.01 * float(np.ptp(log["motor_speed"]))  # as small as a current may be
+    swapped = changed(log, "motor_speed", log[role] * size)
+    swapped = changed(swapped, role, log["motor_speed"] * 0.01)
+    with pytest.raises(InputError, match=f"changes as {role} goes, not as motor_speed"):
+        diagnose([swapped], actuator, faults=few)
+
+
 def test_a_clipped_current_and_missing_positions_are_the_first_findings(case):
     actuator, few, logs = case
     log, role = logs[0], current(logs[0])

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.clocks.quality import clipped_share
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 _CURRENTS = ("torque_current", "current_ref", "supply_current")
 _MISSING, _CLIPPED = 0.01, 0.05  # share of the samples
+_TURN = 0.02  # s over which a position's change is held against a speed
+_ALIKE, _UNLIKE = 0.95, 0.9  # correlation: the same signal; another one, as a current may be
+_PAIRS = 20_000  # samples that are held against each other, about
 _APART = 10.0  # times the stated ratio of two positions, either way: beyond any sensor's gain
 
 
@@ -24,8 +28,10 @@ def check_sizes(log: Log, actuator: Actuator) -> None:
     Raises
     ------
     InputError
-        More current than supply over resistance lets flow; positions whose ratio is another.
+        More current than supply over resistance lets flow; positions whose ratio is another; a
+        motor's speed that a current's column has.
     """
+    _check_speed(log)
     known = actuator.parameters
     most = known.value("inverter.supply_voltage") / known.value("motor.winding_resistance")
     for role in _CURRENTS:
@@ -46,6 +52,33 @@ def check_sizes(log: Log, actuator: Actuator) -> None:
                 f"{log.name}: the motor turns {seen:.4g} rad a metre of the output, "
                 f"{actuator.name} {stated:.4g}: swapped columns, or another unit"
             )
+
+
+def _check_speed(log: Log) -> None:
+    """Refuse a log whose motor speed is none, where a current is how its position changes."""
+    if not log.has("motor_position", "motor_speed") or log.time[-1] - log.time[0] <= 2.0 * _TURN:
+        return
+    half = max(round(0.5 * _TURN / float(np.median(np.diff(log.time)))), 1)
+    step = max(len(log.time) // _PAIRS, 1)
+    at = np.arange(half, len(log.time) - half, step)
+    rate = log["motor_position"][at + half] - log["motor_position"][at - half]
+    alike = _correlation(rate, log["motor_speed"][at])
+    if alike > _UNLIKE or not alike:  # one that stands still is a fault for diagnosis
+        return
+    for role in _CURRENTS:
+        if log.has(role) and _correlation(rate, log[role][at]) > _ALIKE:
+            raise InputError(
+                f"{log.name}: motor_position changes as {role} goes, not as motor_speed: "
+                "swapped columns"
+            )
+
+
+def _correlation(a: Floats, b: Floats) -> float:
+    """Of samples that both have; nought where one of them stands still."""
+    both = np.isfinite(a) & np.isfinite(b)
+    a, b = a[both] - np.mean(a[both]), b[both] - np.mean(b[both])
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(a @ b) / size if size > 0.0 else 0.0
 
 
 def unsound(log: Log) -> tuple[str, ...]:
