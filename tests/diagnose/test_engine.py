@@ -231,8 +231,12 @@ def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
     from elevon.diagnose.by_model import traces_of
 
     items = read_logs([logs["backlash"]])
-    result = diagnose(items, unit, baselines=read_logs([logs["base"]]), faults=FEW)
-    (traces,) = traces_of(items, unit, result)
+    base = read_logs([logs["base"]])
+    result = diagnose(items, unit, baselines=base, faults=FEW)
+    traces, healthy = traces_of(items, unit, result, base)
+    assert (traces.baseline, healthy.baseline, healthy.name) == (False, True, base[0].name)
+    assert healthy.panels[0].named is None
+    assert healthy.panels[0].apart < 0.3 * traces.panels[0].apart
     gap = traces.panels[0]
     misses = [float(np.std(gap.log - line)) for line in (gap.healthy, gap.named)]
     assert gap.unit == "deg"

@@ -175,8 +175,12 @@ def check_request(logs: Sequence[Log], rate: float) -> None:
         raise InputError(f"false-alarm rate {rate:g} must be between 0 and 1")
 
 
-def traces_of(logs: Sequence[Log], actuator: Actuator, result: Diagnosis) -> list[Traces]:
+def traces_of(
+    logs: Sequence[Log], actuator: Actuator, result: Diagnosis, baselines: Sequence[Log] = ()
+) -> list[Traces]:
     """Return each log's signals beside the healthy model's and those with what is named.
+
+    Behind them each baseline's of the same test as a log, beside the healthy model's in its place.
 
     Parameters
     ----------
@@ -186,15 +190,21 @@ def traces_of(logs: Sequence[Log], actuator: Actuator, result: Diagnosis) -> lis
         The healthy unit.
     result : Diagnosis
         The answer.
+    baselines : sequence of Log, optional
+        Healthy logs that it stands on.
     """
     texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
     units = [ReplayUnit(), *([ReplayUnit(Variant(faults=texts))] if texts else [])]
-    out = []
-    for item in (reading_of(log, actuator) for log in logs):
-        panels = [
-            SignalPanel(s.name, s.unit, *s.lines, *([None] * (3 - len(s.lines))))
-            for s in item.drawn(units)
-        ]
-        good = item.log.good
-        out.append(Traces(item.name, item.log.time[good], panels))
-    return out
+    items = [reading_of(log, actuator) for log in logs]
+    healthy = [reading_of(log, actuator) for log in baselines]
+    same = [b for b in healthy if any(item.same(b) for item in items)]
+    out = [_traces(item, units) for item in items]
+    return out + [replace(_traces(b, units[:1]), baseline=True) for b in same]
+
+
+def _traces(item: Reading, units: Sequence[ReplayUnit]) -> Traces:
+    panels = [
+        SignalPanel(s.name, s.unit, *s.lines, *([None] * (3 - len(s.lines))))
+        for s in item.drawn(units)
+    ]
+    return Traces(item.name, item.log.time[item.log.good], panels)

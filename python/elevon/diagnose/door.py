@@ -86,7 +86,7 @@ def diagnose(
         raise InputError(f"--method {method}: serves turning outputs; {unit.name} has none")
     data, healthy = as_logs(logs), _healthy(baselines)
     result = run(data, unit, baselines=healthy, faults=faults, false_alarm=false_alarm)
-    draw = partial(traces_of, data, unit, result)
+    draw = partial(traces_of, data, unit, result, healthy)
     return replace(_signed(result, unit, healthy, method), draw=draw)
 
 

@@ -48,11 +48,15 @@ class SignalPanel:
 
 @dataclass(frozen=True)
 class Traces:
-    """A log's signals beside the model's, on the instants of `time` [s], shape (n,)."""
+    """A log's signals beside the model's, on the instants of `time` [s], shape (n,).
+
+    `baseline`: whether it is one, not a log that was diagnosed.
+    """
 
     name: str
     time: Floats
     panels: Sequence[SignalPanel]
+    baseline: bool = False
 
 
 def named_faults(result: Diagnosis) -> Mapping[str, float]:
@@ -80,7 +84,7 @@ def traces_figure(traces: Traces) -> Figure:
             lines = [("grey", "healthy model", 4.5, panel.healthy)]
             if panel.named is not None:
                 lines.append(("orange", "model with what is named", 3.0, panel.named))
-            lines.append(("blue", "log", 1.0, panel.log))
+            lines.append(("blue", "baseline" if traces.baseline else "log", 1.0, panel.log))
             for colour, label, width, values in lines:
                 line = _means(traces.time, values)
                 axis.plot(*line, color=COLOURS[colour], lw=width, label=label)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from elevon.diagnose.pictures import Traces
 
 _DRAWN = 4  # logs
+_BASELINES = 2  # drawn
 
 
 def diagnosis_page(
@@ -33,13 +34,14 @@ def diagnosis_page(
     date : str, optional
         Printed on the page.
     traces : sequence of Traces, optional
-        Of the logs; the first four are drawn.
+        Of the logs, the first four of which are drawn, and of baselines, the first two.
     """
     report = Report(f"Diagnosis of {actuator}", sentence(result), date=date)
     report.judge(*_badge(result))
     _causes(report, result)
     decided = _deciding(result)
-    _signals(report, traces, decided)
+    _signals(report, [t for t in traces if not t.baseline], decided)
+    _baselines(report, [t for t in traces if t.baseline])
     _features(report, result)
     if result.alternatives:
         _alternatives(report, result)
@@ -161,6 +163,20 @@ def _signals(report: Report, given: Sequence[Traces], decided: Moved | None) -> 
     for item in traces:
         named = " and the model with what is named" if item.panels[0].named is not None else ""
         text = f"{item.name} over the healthy model in the same test{named}"
+        section.figure(traces_figure(item), f"{text}; means of short stretches.")
+
+
+def _baselines(report: Report, traces: Sequence[Traces]) -> None:
+    """Draw baselines as the logs are: what the model shows of them, no fault has to explain."""
+    if not traces:
+        return
+    section = report.section("Baselines against the healthy model")
+    section.text(
+        "Where a baseline leaves the model as the log does, it is the model that is off, no fault: "
+        "the log is held against the baseline there."
+    )
+    for item in traces[:_BASELINES]:
+        text = f"{item.name} over the healthy model in the same test"
         section.figure(traces_figure(item), f"{text}; means of short stretches.")
 
 
