@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from elevon import Actuator, Scenario, simulate
-from elevon.bench.procedure import Procedure
-from elevon.bench.standard import StandardTest
 from elevon.diagnose.engine.days import drawn
 from elevon.diagnose.monitor import Monitor
 from elevon.diagnose.monitor.by_command import ActionCutter
@@ -16,7 +14,6 @@ from elevon.errors import InputError
 from elevon.live.trace import LiveMotion
 from elevon.live.watching import StreamWatch
 from elevon.logs.log import Log
-from studies.fault_limits.standard import Day, day_logs
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 FEW = ["backlash@transmission", "gain_drift@control.position"]
@@ -186,35 +183,3 @@ def test_an_actuator_of_ones_own_is_watched():
         seen.feed_log(log(unit, command, 3, f"{fault}:step(time={ONSET} s)"))
         assert seen.alarm.since == pytest.approx(ONSET, abs=watch.width)
         assert seen.alarm.causes[0].kind == fault.split("@")[0]
-
-
-OFTEN = 600.0  # s between false alarms
-HOURS = [(20 + unit, 4, 60.0) for unit in range(4)]  # seed, streams, s of each
-
-
-@pytest.mark.long
-def test_healthy_streams_of_a_screw_alarm_no_more_often_than_set():
-    """At high fidelity, all candidates; prints the hours watched and the rate with its interval."""
-    from scipy.stats import chi2, poisson
-
-    unit = Actuator.load("nasa-ballscrew")
-    sine = {"kind": "sine", "amplitude": "30 mm", "frequency": "0.5 Hz"}
-    trace = {"kind": "trace", "name": "stream", "duration": "60 s", "command": {"terms": [sine]}}
-    steps = [{"kind": "force", "opposing": "1500 N"}, trace]
-    procedure = Procedure.model_validate({"name": "s", "stand": "load-actuator", "step": steps})
-    alarms, seconds, tops = 0, 0.0, []
-    for seed, streams, length in HOURS:
-        days = [Day((), 100 * seed + k) for k in range(streams + 1)]
-        base, *healthy = day_logs(unit, StandardTest("stream", procedure), days, "high")
-        watch = Monitor(unit, [base], false_alarm_time=OFTEN, longest=length)
-        for item in healthy:
-            seen = watch.fresh()
-            seen.feed_log(item)
-            alarms += seen.alarm is not None
-            tops.append(seen.top)
-            seconds += watch.width * seen.windows
-    hours = seconds / 3600.0
-    ends = chi2.ppf([0.05, 0.95], [2 * alarms, 2 * alarms + 2]) / 2.0 / hours
-    text = f"{alarms} alarms in {hours:.3f} h; {np.nan_to_num(ends)} an hour"
-    print(f"{text}, set {3600.0 / OFTEN:g}; highest statistic {max(tops):.3g}")  # noqa: T201
-    assert alarms <= poisson.ppf(0.95, seconds / OFTEN)

@@ -1,0 +1,58 @@
+"""Real logs of healthy machines that no actuator file is calibrated to: never a cause."""
+
+from collections import Counter
+
+import pytest
+
+import elevon
+from elevon.diagnose.learning.classify import LabelledLog, learned_classes
+from elevon.errors import ElevonError
+from elevon.logs.formats.cranfield import read_cranfield
+from elevon.logs.log import Log
+
+pytestmark = [
+    pytest.mark.shared,
+    pytest.mark.long,
+    pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning"),
+]
+
+
+def recordings(folder, *conditions):
+    for name in conditions:
+        for item in read_cranfield(folder / f"{name}.csv.gz"):
+            about = item.meta
+            if about["profile"] == "trap":
+                load, run = about["load_kgf"], about["run"]
+                yield name, load, run, Log.of(item, f"{name} {load:g} {run}")
+
+
+def test_a_healthy_screw_of_another_make_is_never_given_a_cause(shared):
+    """21 recordings without a baseline, with one of another run, with itself."""
+    items = list(recordings(shared / "data" / "cranfield", "normal"))
+    seen = {}
+    for _, load, run, log in items:
+        other = next(x for _, a, n, x in items if a == load and n != run)
+        for base in ([], [other], [log]):
+            try:
+                answer = elevon.diagnose(log, "nasa-ballscrew", baselines=base)
+            except ElevonError:
+                seen.setdefault(len(base), Counter())["refused"] += 1
+                continue
+            seen.setdefault(len(base), Counter())[answer.status] += 1
+            assert not answer.best
+    print(seen)  # noqa: T201 - the counts are what it is for
+    assert set(seen[1]) <= {"healthy", "model_does_not_fit", "refused"}
+
+
+def test_real_classes_are_learnt_and_judged_by_runs_and_loads_left_out(shared):
+    """Normal, backlash, lost lubrication: three loads, seven runs each."""
+    names = ("normal", "backlash2", "lackLubrication2")
+    items = list(recordings(shared / "data" / "cranfield", *names))
+    known = [
+        LabelledLog("healthy" if name == "normal" else name, f"run {run}", f"{load:g} kgf")
+        for name, load, run, _ in items
+    ]
+    left = learned_classes([log for *_, log in items], known).report["left_out"]
+    print(left)  # noqa: T201
+    assert left["unit"]["logs"] == len(items)
+    assert left["unit"]["right"] > 0.75 * len(items)
