@@ -47,12 +47,7 @@ def wave_records() -> Mapping[str, WaveRecord]:
 
     return {
         item["kind"]: WaveRecord(
-            item["kind"],
-            item["text"],
-            tuple(
-                WaveParameter(p["name"], p["unit"], p["default"], p["text"])
-                for p in item["parameters"]
-            ),
+            item["kind"], item["text"], tuple(WaveParameter(**p) for p in item["parameters"])
         )
         for item in _core.waveforms()
     }

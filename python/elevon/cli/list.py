@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.cli.acting import by_drive, check, chosen
 from elevon.cli.groups import group
-from elevon.cli.output import print_table
+from elevon.cli.output import fields_of, print_table
 from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
@@ -78,19 +78,20 @@ def parameters(
     wiring = Actuator.load(actuator).wiring
     check(fidelity, [wiring])
     rows = [
-        {
-            "path": record.path,
-            "symbol": record.symbol,
-            "unit": record.unit,
-            "range": record.range_text,
-            "default": record.default_value(),
-            "register": record.register,
-            "fidelities": list(record.fidelities),
-            "not_modelled": dict(record.not_modelled),
-            "when": list(record.when),
-            "acts": record.acts_text,
-            "text": record.text,
-        }
+        fields_of(
+            record,
+            "path",
+            "symbol",
+            "unit",
+            "register",
+            "fidelities",
+            "not_modelled",
+            "when",
+            "text",
+            range="range_text",
+            acts="acts_text",
+        )
+        | {"default": record.default_value()}
         for record in records(wiring).values()
         if chosen(record, fidelity, not_modelled)
     ]
@@ -112,7 +113,15 @@ def faults(
     at each fidelity.
     """
     rows = [row for row in _faults(actuator, fidelity) if chosen(row[1], fidelity, not_modelled)]
-    listed = [{"wiring": wiring, **_fault(record), **acts} for wiring, record, acts in rows]
+    listed = [
+        {"wiring": wiring}
+        | fields_of(
+            record, "kind", "places", "unit", "attributes", "fidelities", "not_modelled", "effect",
+            "source", "rate", "rate_source", range="range_text",
+        )
+        | acts
+        for wiring, record, acts in rows
+    ]  # fmt: skip
     first, where = (("wiring",), "fidelities") if actuator is None else ((), "acts")
     columns = ("kind", "places", "unit", "range", where, "effect", "source", "rate", "rate_source",
                "not_modelled")  # fmt: skip
@@ -138,22 +147,6 @@ def _faults(
     return [(actuator.wiring, it, by_drive(actuator, it)) for it in own_faults(actuator)]
 
 
-def _fault(record: FaultRecord) -> dict[str, Any]:
-    return {
-        "kind": record.kind,
-        "places": list(record.places),
-        "unit": record.unit,
-        "range": record.range_text,
-        "attributes": [dict(item) for item in record.attributes],
-        "fidelities": list(record.fidelities),
-        "not_modelled": dict(record.not_modelled),
-        "effect": record.effect,
-        "source": record.source,
-        "rate": record.rate,
-        "rate_source": record.rate_source,
-    }
-
-
 @command(app)
 def laws(
     actuator: str | None = None,
@@ -164,15 +157,8 @@ def laws(
 
     known = LAWS if actuator is None else laws_of(Actuator.load(actuator).wiring)
     rows = [
-        {
-            "law": law.name,
-            "fault": law.key,
-            "unit": law.unit,
-            "drivers": list(law.drivers),
-            "coefficients": {n: f"{c.value:g} {c.unit}" for n, c in law.coefficients.items()},
-            "text": law.text,
-            "source": law.source,
-        }
+        fields_of(law, "unit", "drivers", "text", "source", law="name", fault="key")
+        | {"coefficients": {n: f"{c.value:g} {c.unit}" for n, c in law.coefficients.items()}}
         for law in known.values()
     ]
     return _answer("laws", rows, ("law", "fault", "unit", "drivers", "text"))
@@ -183,17 +169,7 @@ def waveforms() -> Answer:
     """List the waveforms of commands and loads with their parameters (* = must be given)."""
     from elevon.waveforms import wave_records
 
-    rows: list[dict[str, Any]] = [
-        {
-            "kind": record.kind,
-            "text": record.text,
-            "parameters": [
-                {"name": p.name, "unit": p.unit, "default": p.default, "text": p.text}
-                for p in record.parameters
-            ],
-        }
-        for record in wave_records().values()
-    ]
+    rows = [fields_of(record, "kind", "text", "parameters") for record in wave_records().values()]
 
     def show() -> None:
         cells = [
@@ -221,14 +197,7 @@ def features(
         rows = _own_features(actuator, fidelity)
     else:
         rows = [
-            {
-                "name": record.name,
-                "unit": record.unit,
-                "family": record.family,
-                "roles": list(record.roles),
-                "minimum_rate": record.minimum_rate,
-                "text": record.text,
-            }
+            fields_of(record, "name", "unit", "family", "roles", "minimum_rate", "text")
             for record in feature_records().values()
         ]
     last = "roles" if actuator is None else "signals"
@@ -249,14 +218,8 @@ def _own_features(reference: str, fidelity: str) -> list[dict[str, Any]]:
     roles = comparable(assign_roles(units, stated=stated), units)
     by_role = {role: units[name] for role, name in roles.items()}
     return [
-        {
-            "name": record.name,
-            "unit": record.unit_of(by_role),
-            "family": record.family,
-            "signals": [roles[role] for role in record.roles],
-            "minimum_rate": record.minimum_rate,
-            "text": record.text,
-        }
+        fields_of(record, "name", "family", "minimum_rate", "text")
+        | {"unit": record.unit_of(by_role), "signals": [roles[role] for role in record.roles]}
         for record in feature_records().values()
         if roles.keys() >= set(record.roles)
     ]

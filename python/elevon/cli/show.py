@@ -9,7 +9,7 @@ import typer
 
 from elevon.cli import common
 from elevon.cli.acting import check, chosen
-from elevon.cli.output import print_table, say
+from elevon.cli.output import fields_of, print_table, say
 from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
@@ -123,39 +123,14 @@ def _as_json(loaded: Any, svg: Path | None, parameters: list[Any]) -> dict[str, 
     from elevon.parameters import records
 
     known = records(loaded.wiring)
-    return {
-        "name": loaded.name,
-        "title": loaded.title,
-        "wiring": loaded.wiring,
-        "file": loaded.path,
-        "hash": loaded.hash,
-        "references": loaded.references,
+    design = ("value", "text", "confidence", "source")
+    stated = ("path", "value", "unit", "confidence", "source", "note", "old")
+    return fields_of(loaded, "name", "title", "wiring", "hash", "references", file="path") | {
         "svg": svg,
-        "design": {
-            name: {
-                "value": item.value,
-                "text": item.text,
-                "confidence": item.confidence,
-                "source": item.source,
-            }
-            for name, item in loaded.design.items()
-        },
+        "design": {name: fields_of(item, *design) for name, item in loaded.design.items()},
         "parameters": [
-            {
-                "path": p.path,
-                "value": p.value,
-                "si_unit": known[p.path].unit,
-                "shown": p.text,
-                "unit": p.unit,
-                "confidence": p.confidence,
-                "source": p.source,
-                "note": p.note,
-                "old": p.old,
-                "text": known[p.path].text,
-                "fidelities": list(known[p.path].fidelities),
-                "not_modelled": dict(known[p.path].not_modelled),
-                "when": list(known[p.path].when),
-            }
+            fields_of(p, *stated, shown="text")
+            | fields_of(known[p.path], "text", "fidelities", "not_modelled", "when", si_unit="unit")
             for p in parameters
         ],
     }

@@ -50,14 +50,7 @@ def feature_records() -> Mapping[str, FeatureRecord]:
     from elevon import _core
 
     return {
-        item["name"]: FeatureRecord(
-            item["name"],
-            item["unit"],
-            item["text"],
-            item["family"],
-            tuple(item["roles"]),
-            item["minimum_rate"],
-        )
+        item["name"]: FeatureRecord(**{**item, "roles": tuple(item["roles"])})
         for item in _core.feature_records()
     }
 

@@ -167,21 +167,6 @@ def _unknown_path(path: str, known: Mapping[str, Record], place: str | None) -> 
 
 
 def _record(item: Mapping[str, Any]) -> Record:
-    choices = item["choices"]
-    return Record(
-        path=item["path"],
-        symbol=item["symbol"],
-        unit=item["unit"],
-        minimum=float(item["minimum"]),
-        maximum=float(item["maximum"]),
-        minimum_open=bool(item["minimum_open"]),
-        maximum_open=bool(item["maximum_open"]),
-        text=item["text"],
-        register=item["register"],
-        default=None if item["default"] is None else float(item["default"]),
-        choices=None if not choices else tuple(choices),
-        whole=bool(item["whole"]),
-        fidelities=tuple(item["fidelities"]),
-        not_modelled=item["not_modelled"],
-        when=tuple(item["when"]),
-    )
+    lists = {name: tuple(item[name]) for name in ("fidelities", "when")}
+    choices = tuple(item["choices"]) if item["choices"] else None
+    return Record(**{**item, **lists, "choices": choices})
