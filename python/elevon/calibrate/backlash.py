@@ -93,62 +93,79 @@ def fit_backlash(logs: Sequence[Log], ratio: float, count: float) -> BacklashFit
     used = [log for log in logs if _usable(log, ratio, count)]
     if not used:
         return None
-    drivers = [log.motor / ratio for log in used if log.has("motor_position")]
-    outputs = [log.output for log in used if log.has("output_position")]
-    width, centre = _start(used, drivers, outputs)
-    keeps = [_after_reversal(x, width) for x in drivers]
-    wide = [k for k, keep in enumerate(keeps) if keep.any()]
+    positions = _Positions.of(used, ratio)
+    wide = [k for k, keep in enumerate(positions.keeps) if keep.any()]
     if not wide:
         return None
     if len(wide) < len(used):
         return fit_backlash([used[k] for k in wide], ratio, count)
-    speeds = [log.speed / ratio for log in used]
-    scale = np.array([count, count, 1e-4, 1e-3])
+    return _fitted(positions, count)
 
-    def residual(p: Floats) -> Floats:
+
+@dataclass(frozen=True)
+class _Positions:
+    """Two positions of several logs at the output, and the samples of each that count.
+
+    `start` is backlash and offset by the medians.
+    """
+
+    logs: Sequence[Log]
+    drivers: Sequence[Floats]
+    outputs: Sequence[Floats]
+    speeds: Sequence[Floats]
+    keeps: Sequence[npt.NDArray[np.bool_]]
+    start: tuple[float, float]
+
+    @classmethod
+    def of(cls, logs: Sequence[Log], ratio: float) -> _Positions:
+        drivers, outputs = [log.motor / ratio for log in logs], [log.output for log in logs]
+        start = _start(logs, drivers, outputs)
+        keeps = [_after_reversal(x, start[0]) for x in drivers]
+        return cls(logs, drivers, outputs, [log.speed / ratio for log in logs], keeps, start)
+
+    @property
+    def reach(self) -> float:
+        return 0.5 * max(float(np.ptp(x)) for x in self.drivers)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(log.name for log in self.logs)
+
+    def misfit(self, p: Floats) -> Floats:
+        """Encoder as predicted less as logged, of backlash, offset, gain and delay."""
         parts = []
-        for x, y, v, keep in zip(drivers, outputs, speeds, keeps, strict=True):
+        for x, y, v, keep in zip(self.drivers, self.outputs, self.speeds, self.keeps, strict=True):
             following = through_backlash(x, abs(float(p[0])))
             moving = np.gradient(following) / np.maximum(np.abs(np.gradient(x)), 1e-15)
             follows = v * np.clip(np.abs(moving), 0.0, 1.0)
             parts.append(((p[2] * following + p[1] - p[3] * follows) - y)[keep])
-        return np.concatenate(parts) / count
+        return np.concatenate(parts)
+
+
+def _fitted(positions: _Positions, count: float) -> BacklashFit:
+    scale = np.array([count, count, 1e-4, 1e-3])
+
+    def residual(p: Floats) -> Floats:
+        return positions.misfit(p) / count
 
     best = fit_residual(
-        residual, [width, centre, 1.0, 0.0], scale=scale, loss="soft_l1", soft=3.0, most=30,
+        residual, [*positions.start, 1.0, 0.0], scale=scale, loss="soft_l1", soft=3.0, most=30,
         jacobian=lambda p: _jacobian(residual, p, scale),
     )  # fmt: skip
-    # Blocks of whole strokes: the encoder's rounding repeats itself within one.
-    strokes = [(x.time[k], x.speed[k], x.period) for x, k in zip(used, keeps, strict=True)]
-    blocks = numbered_strokes(strokes, best.weight * best.residual)
-    covariance, degrees = best.covariance(blocks)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    value = np.append(abs(best.x[0]), best.x[1:])
     rms = count * float(np.sqrt(np.mean(best.residual**2)))
     if rms > _FLOATS * count:
-        return _spanned(used, drivers, outputs, keeps, count=count, rms=rms)
-    pairs = [(float(v), float(s)) for v, s in zip(value, std, strict=True)]
-    return BacklashFit(
-        backlash=pairs[0],
-        offset=pairs[1],
-        gain=pairs[2],
-        delay=pairs[3],
-        degrees=degrees,
-        rms=rms,
-        reach=0.5 * max(float(np.ptp(x)) for x in drivers),
-        logs=tuple(x.name for x in used),
-    )
+        return _spanned(positions, count=count, rms=rms)
+    # Blocks of whole strokes: the encoder's rounding repeats itself within one.
+    pairs = zip(positions.logs, positions.keeps, strict=True)
+    strokes = [(x.time[k], x.speed[k], x.period) for x, k in pairs]
+    covariance, degrees = best.covariance(numbered_strokes(strokes, best.weight * best.residual))
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    value = np.append(abs(best.x[0]), best.x[1:])
+    estimates = ((float(v), float(s)) for v, s in zip(value, std, strict=True))
+    return BacklashFit(*estimates, degrees, rms, positions.reach, positions.names)
 
 
-def _spanned(
-    logs: Sequence[Log],
-    drivers: Sequence[Floats],
-    outputs: Sequence[Floats],
-    keeps: Sequence[npt.NDArray[np.bool_]],
-    *,
-    count: float,
-    rms: float,
-) -> BacklashFit:
+def _spanned(positions: _Positions, *, count: float, rms: float) -> BacklashFit:
     """Backlash of an output that flies from one end of the gap to the other.
 
     The difference of the two positions piles up at both ends. What it leaves out at either side
@@ -157,12 +174,11 @@ def _spanned(
     of the rounding. Where the log spans far more than the stretches that agree with each other,
     loads deflect the transmission: those stretches hold the backlash, the rest is compliance.
     """
-    gaps = [(y - x)[keep] for x, y, keep in zip(drivers, outputs, keeps, strict=True)]
+    samples = zip(positions.drivers, positions.outputs, positions.keeps, strict=True)
+    gaps = [(y - x)[keep] for x, y, keep in samples]
     low, high, middle = _spans(gaps)
-    unloaded = _unloaded(
-        [gap[a:b] for gap, log in zip(gaps, logs, strict=True) for a, b in _stretches(gap, log)],
-        count,
-    )
+    pairs = zip(gaps, positions.logs, strict=True)
+    unloaded = _unloaded([gap[a:b] for gap, log in pairs for a, b in _stretches(gap, log)], count)
     beyond = 0.0
     if unloaded and high > (1.0 + _DEFLECTS) * max(span for _, span, _ in map(_span, unloaded)):
         whole, (low, high, middle) = high, _spans(unloaded)
@@ -176,8 +192,8 @@ def _spanned(
         delay=(0.0, np.inf),
         degrees=np.inf,
         rms=rms,
-        reach=0.5 * max(float(np.ptp(x)) for x in drivers),
-        logs=tuple(log.name for log in logs),
+        reach=positions.reach,
+        logs=positions.names,
         floats=True,
         beyond=beyond,
     )

@@ -29,51 +29,71 @@ def plant_findings(
     estimates: Sequence[Estimate],
 ) -> list[str]:
     """Sentences on torque scale, brakes, drive and misfit."""
-    says = []
+    return [
+        *_of_the_balance(plant),
+        *_of_the_scale(torque, actuator),
+        *_of_brakes(logs),
+        *([] if dynamic is None else _of_model_runs(dynamic, actuator, estimates)),
+    ]
+
+
+def _of_the_balance(plant: Regression | None) -> list[str]:
     if plant is None:
-        says.append(
+        return [
             "no log moves in both directions long enough for a torque balance: friction and "
             "inertia come from model runs alone, or stay as they were"
-        )
-    elif plant.explained < _POOR:
-        says.append(
+        ]
+    if plant.explained < _POOR:
+        return [
             f"the torque balance explains only {100 * plant.explained:.0f} % of the "
             "current: something the model lacks moves it"
-        )
+        ]
+    return []
+
+
+def _of_the_scale(torque: Torque, actuator: Actuator) -> list[str]:
     if torque.measured:
-        says += _convention(torque, actuator)
-    else:
-        says.append(
-            "no load cell: the logs determine inertia, friction and speed gain only as ratios to "
-            "the torque constant; motor.emf_constant is kept as given and the values scale "
-            "with it"
-        )
-    says += [
-        f"{log.name}: the brake acted but its torque was not measured; its friction is not taken "
-        "for the actuator's"
-        if len(logs) > 1
-        else f"{log.name}: the brake acted but its torque was not measured; friction includes it"
+        return _convention(torque, actuator)
+    return [
+        "no load cell: the logs determine inertia, friction and speed gain only as ratios to "
+        "the torque constant; motor.emf_constant is kept as given and the values scale "
+        "with it"
+    ]
+
+
+def _of_brakes(logs: Sequence[Log]) -> list[str]:
+    """Say what becomes of a brake whose torque nobody measured."""
+    alone = "friction includes it"
+    among_others = "its friction is not taken for the actuator's"
+    what = among_others if len(logs) > 1 else alone
+    return [
+        f"{log.name}: the brake acted but its torque was not measured; {what}"
         for log in logs
         if log.brake.known in {"on", "force"}
     ]
-    if dynamic is not None:
-        nominal = actuator.parameters["drive.kind"].value
-        if dynamic.drive != nominal:
-            says.append(f"drive.kind {dynamic.drive!r} explains the logs better than {nominal!r}")
-        says += [
-            f"{path} absorbs what the model lacks ({_percent(a, b)}): model runs want {a:.5g}, "
-            f"the signals themselves say {b:.5g}"
-            for path, a, b in dynamic.absorbed
-        ]
-        says += [f"{path}: the model runs end at its bound" for path in dynamic.at_bound]
-        known = {item.path for item in estimates}
-        says += [
-            f"{path} is not determined: {why}"
-            for path, why in dynamic.ranking.dropped.items()
-            if path not in known
-        ]
-        if not dynamic.converged:
-            says.append("the fit on model runs stopped before its tolerance was met")
+
+
+def _of_model_runs(
+    dynamic: Dynamic, actuator: Actuator, estimates: Sequence[Estimate]
+) -> list[str]:
+    says = []
+    nominal = actuator.parameters["drive.kind"].value
+    if dynamic.drive != nominal:
+        says.append(f"drive.kind {dynamic.drive!r} explains the logs better than {nominal!r}")
+    says += [
+        f"{path} absorbs what the model lacks ({_percent(a, b)}): model runs want {a:.5g}, "
+        f"the signals themselves say {b:.5g}"
+        for path, a, b in dynamic.absorbed
+    ]
+    says += [f"{path}: the model runs end at its bound" for path in dynamic.at_bound]
+    known = {item.path for item in estimates}
+    says += [
+        f"{path} is not determined: {why}"
+        for path, why in dynamic.ranking.dropped.items()
+        if path not in known
+    ]
+    if not dynamic.converged:
+        says.append("the fit on model runs stopped before its tolerance was met")
     return says
 
 
@@ -120,8 +140,7 @@ def amplitude_findings(commands: Sequence[CommandFit], estimates: Sequence[Estim
     for fit in commands:
         if fit.factor is None:
             continue
-        std = abs(fit.factor) * fit.amplitude_std / max(abs(fit.amplitude), 1e-300)
-        if abs(fit.factor - 1.0) > max(_FACTOR, 3.0 * std):
+        if abs(fit.factor - 1.0) > max(_FACTOR, 3.0 * (fit.amplitude_factor_std or 0.0)):
             says.append(
                 f"{fit.log}: amplitude factor {fit.factor:.4f} between the command the "
                 "bench followed and the one noted: the command is scaled, not the "
