@@ -14,7 +14,7 @@ ROWS = [
     ["seam"],
     ["errors", "extras"],
     ["units", "files", "progress", "memory", "data", "threads", "plain"],
-    ["documents", "series", "number_text", "report", "worklog", "containers", "estimate"],
+    ["documents", "strict", "series", "number_text", "report", "worklog", "containers", "estimate"],
     ["transaction", "results"],
     ["recording"],
     ["parameters", "loads"],

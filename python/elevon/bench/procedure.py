@@ -19,12 +19,13 @@ from pydantic import (
     model_validator,
 )
 
-from elevon.bench.steps import Frozen, Step, TraceStep, plain_name
+from elevon.bench.steps import Step, TraceStep, plain_name
 from elevon.documents import read_toml, validated
 from elevon.errors import unknown
+from elevon.strict import Strict
 
 
-class Procedure(Frozen):
+class Procedure(Strict):
     """A bench procedure.
 
     Attributes

@@ -7,20 +7,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictFloat, StrictInt, StrictStr
+from pydantic import Field, StrictStr
 
 from elevon.documents import read_toml, validated
 from elevon.errors import InputError
+from elevon.strict import Quantity, Strict
 from elevon.units import parse_quantity
 
-Quantity = StrictInt | StrictFloat | StrictStr
 
-
-class _Frozen(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class ForceSpec(_Frozen):
+class ForceSpec(Strict):
     """A load actuator in force control.
 
     Attributes
@@ -40,14 +35,14 @@ class ForceSpec(_Frozen):
     mass: Quantity = 0.0
 
 
-class ChannelSpec(_Frozen):
+class ChannelSpec(Strict):
     """What a recorded channel adds: noise (standard deviation) and a lag of first order."""
 
     noise: Quantity = 0.0
     lag: Quantity = 0.0
 
 
-class Stand(_Frozen):
+class Stand(Strict):
     """A stand, as its file says.
 
     Attributes

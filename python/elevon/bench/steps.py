@@ -8,8 +8,6 @@ import re
 from typing import Annotated, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     StrictFloat,
     StrictInt,
@@ -20,16 +18,10 @@ from pydantic import (
 
 from elevon.errors import InputError
 from elevon.scenario.scenario import Command, Term
+from elevon.strict import Quantity, Strict
 from elevon.units import parse_quantity
 
-Quantity = StrictInt | StrictFloat | StrictStr
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}\Z")
-
-
-class Frozen(BaseModel):
-    """Data of a procedure: no key unknown, no value changed."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def _checked(value: Quantity, unit: str, low: float, name: str) -> Quantity:
@@ -50,7 +42,7 @@ def plain_name(value: str) -> str:
     return value
 
 
-class BacklashStep(Frozen):
+class BacklashStep(Strict):
     """Set the backlash: by the micrometer, net (the intrinsic one added), or in total.
 
     Attributes
@@ -95,7 +87,7 @@ class BacklashStep(Frozen):
         return backlash + extra
 
 
-class BrakeStep(Frozen):
+class BrakeStep(Strict):
     """Set the command of the brake's loop; no terms: the brake is off.
 
     Attributes
@@ -108,7 +100,7 @@ class BrakeStep(Frozen):
     terms: tuple[Term, ...] = ()
 
 
-class SpringStep(Frozen):
+class SpringStep(Strict):
     """Fit the springs of the load module, or take them off.
 
     Attributes
@@ -143,7 +135,7 @@ class SpringStep(Frozen):
         return _checked(value, "m", 0.0, "length")
 
 
-class Drop(Frozen):
+class Drop(Strict):
     """One mass hung on each cable from a time to another, counted from the trigger."""
 
     mass: Quantity
@@ -160,7 +152,7 @@ class Drop(Frozen):
         return self
 
 
-class WeightsStep(Frozen):
+class WeightsStep(Strict):
     """Hang weights on the winding guide's cables; no drops: none.
 
     Attributes
@@ -188,7 +180,7 @@ class WeightsStep(Frozen):
         return self
 
 
-class ForceStep(Frozen):
+class ForceStep(Strict):
     """Set the load actuator's command; parts add up, positive opposes positive motion.
 
     Attributes
@@ -221,21 +213,21 @@ class ForceStep(Frozen):
         return self
 
 
-class RigStep(Frozen):
+class RigStep(Strict):
     """Move the output by the rig, m/s (a friction test); no terms: the actuator moves itself."""
 
     kind: Literal["rig"]
     terms: tuple[Term, ...] = ()
 
 
-class SettingsStep(Frozen):
+class SettingsStep(Strict):
     """Change parameters of the actuator for the logs that follow, such as the drive's gains."""
 
     kind: Literal["settings"]
     parameters: dict[str, Quantity]
 
 
-class SensorStep(Frozen):
+class SensorStep(Strict):
     """Let a sensor of the stand fail in the logs that follow: none of the actuator's own.
 
     Attributes
@@ -265,7 +257,7 @@ class SensorStep(Frozen):
         return _checked(value, "s", 0.0, "at")
 
 
-class TraceStep(Frozen):
+class TraceStep(Strict):
     """Record one log.
 
     Attributes

@@ -5,25 +5,16 @@ from __future__ import annotations
 from typing import Any, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     StrictBool,
-    StrictFloat,
     StrictInt,
     StrictStr,
     model_validator,
 )
 
-Quantity = StrictInt | StrictFloat | StrictStr
-Number = StrictInt | StrictFloat
+from elevon.strict import Number, Quantity, Strict
+
 Role = Literal["control", "nuisance"]
-
-
-class Strict(BaseModel):
-    """A table whose unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Target(Strict):

@@ -12,8 +12,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr, model_validator
 
-from elevon.campaign.grammar import Axis, Case, Design, Number, Population, Random, Strict
+from elevon.campaign.grammar import Axis, Case, Design, Population, Random
 from elevon.documents import Document, read_toml, validated
+from elevon.strict import Number, Strict
 
 
 class Plan(Strict):

@@ -5,30 +5,22 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
-    StrictFloat,
-    StrictInt,
     StrictStr,
     field_validator,
 )
 
-Number = StrictInt | StrictFloat
+from elevon.strict import Number, Strict
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Citation(_Strict):
+class Citation(Strict):
     """A publication the sources point to."""
 
     key: StrictStr = Field(min_length=1, description="Short name used in the sources")
     text: StrictStr = Field(min_length=1, description="The full citation")
 
 
-class ParameterEntry(_Strict):
+class ParameterEntry(Strict):
     """One parameter as written in the file."""
 
     value: Number | StrictStr = Field(description="The number, or the name of a choice")
@@ -49,7 +41,7 @@ class ParameterEntry(_Strict):
         return source
 
 
-class ValidationLimits(_Strict):
+class ValidationLimits(Strict):
     """What an actuator file promises of its agreement with a log."""
 
     transient: Number = Field(10.0, ge=0.0, description="Seconds left out at a log's beginning")
@@ -63,7 +55,7 @@ class ValidationLimits(_Strict):
     )
 
 
-class Compare(_Strict):
+class Compare(Strict):
     """What `elevon compare` runs when it is given nothing else."""
 
     after: Number = Field(0.0, ge=0.0, description="Seconds left out at the beginning")
@@ -73,7 +65,7 @@ class Compare(_Strict):
     scenario: dict[str, Any] = Field(description="In the form of a scenario file")
 
 
-class ActuatorHeader(_Strict):
+class ActuatorHeader(Strict):
     """The keys of an actuator file that are not parameters."""
 
     name: StrictStr | None = Field(

@@ -26,14 +26,9 @@ from elevon.errors import InputError, did_you_mean
 from elevon.faults import Fault
 from elevon.scenario.bare import check_units, with_texts
 from elevon.series import check_series, read_series
+from elevon.strict import Quantity, Strict
 from elevon.units import parse_quantity
 from elevon.waveforms import TABLE, wave_records
-
-Quantity = StrictInt | StrictFloat | StrictStr
-
-
-class _Frozen(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Term(BaseModel):
@@ -103,13 +98,13 @@ class Term(BaseModel):
             raise ValueError(str(error)) from error
 
 
-class Terms(_Frozen):
+class Terms(Strict):
     """A sum of waveforms acting at one place."""
 
     terms: tuple[Term, ...] = ()
 
 
-class Action(_Frozen):
+class Action(Strict):
     """One action of a command sequence, held until the next: ``extend``, ``retract``, ..."""
 
     time: Quantity
@@ -139,7 +134,7 @@ class Command(Terms):
         return self
 
 
-class Load(_Frozen):
+class Load(Strict):
     """What acts on the actuator from outside; zero where nothing is given.
 
     Attributes
@@ -201,7 +196,7 @@ def _fault(item: Any, index: int) -> Any:
 Values = Annotated[dict[str, Quantity], BeforeValidator(_flat)]
 
 
-class Scenario(_Frozen):
+class Scenario(Strict):
     """What an actuator is commanded, what acts on it, what breaks, and for how long.
 
     Attributes

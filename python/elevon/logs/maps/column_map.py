@@ -6,19 +6,20 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from elevon.documents import read_toml, validated
 from elevon.errors import FormatError, InputError, did_you_mean, nearest
 from elevon.logs.formats.limits import existing_file
 from elevon.logs.maps.signals import known_roles, known_signals
 from elevon.recording.names import check_name
+from elevon.strict import Strict
 
 _MOST_BYTES = 1_000_000
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 
 
-class ColumnEntry(BaseModel):
+class ColumnEntry(Strict):
     """One column: where it stands in the file and what it is to the actuator.
 
     Attributes
@@ -44,8 +45,6 @@ class ColumnEntry(BaseModel):
     text : str
         A line for the reader.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: Text
     match: Text | None = None
@@ -90,7 +89,7 @@ class ColumnEntry(BaseModel):
         return known.role if known else ""
 
 
-class ColumnMap(BaseModel):
+class ColumnMap(Strict):
     """The map of a whole file.
 
     Attributes
@@ -106,8 +105,6 @@ class ColumnMap(BaseModel):
     column : tuple of ColumnEntry
         One table ``[[column]]`` each.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     text: str = Field(default="", max_length=1000)
     gear_ratio: float | None = Field(default=None, gt=0.0)
