@@ -9,83 +9,19 @@ The package imports nothing heavy by itself: every public name is looked up when
 
 import sys
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from elevon.actuator import Actuator as Actuator
-    from elevon.actuator import list_actuators as list_actuators
-    from elevon.calibrate.door import calibrate as calibrate
-    from elevon.calibrate.door import validate as validate
-    from elevon.campaign import load_campaign as load_campaign
-    from elevon.deploy import export_fmu as export_fmu
-    from elevon.diagnose.door import diagnose as diagnose
-    from elevon.diagnose.door import monitor as monitor
-    from elevon.diagnose.learning.door import learn as learn
-    from elevon.diagnose.learning.door import learn_spread as learn_spread
-    from elevon.doctor.door import doctor as doctor
-    from elevon.doors import bench as bench
-    from elevon.doors import compare as compare
-    from elevon.doors import effects as effects
-    from elevon.doors import response as response
-    from elevon.errors import ElevonError as ElevonError
-    from elevon.errors import ElevonWarning as ElevonWarning
-    from elevon.errors import InputError as InputError
-    from elevon.errors import NotActingWarning as NotActingWarning
-    from elevon.logs.read import read_log as read_log
-    from elevon.nexttest.door import next_test as next_test
-    from elevon.prognose.door import fleet as fleet
-    from elevon.prognose.door import next_inspection as next_inspection
-    from elevon.prognose.door import predict as predict
-    from elevon.recording import Channel as Channel
-    from elevon.recording import Clock as Clock
-    from elevon.recording import Recording as Recording
-    from elevon.results import Result as Result
-    from elevon.results import load as load
-    from elevon.scenario import Scenario as Scenario
-    from elevon.session import Fmu as Fmu
-    from elevon.session import Session as Session
-    from elevon.simulate import Run as Run
-    from elevon.simulate import simulate as simulate
-    from elevon.simulate import simulate_batch as simulate_batch
 
-_PUBLIC = {
-    "bench": "elevon.doors",
-    "calibrate": "elevon.calibrate.door",
-    "compare": "elevon.doors",
-    "diagnose": "elevon.diagnose.door",
-    "doctor": "elevon.doctor.door",
-    "effects": "elevon.doors",
-    "export_fmu": "elevon.deploy",
-    "fleet": "elevon.prognose.door",
-    "learn": "elevon.diagnose.learning.door",
-    "learn_spread": "elevon.diagnose.learning.door",
-    "monitor": "elevon.diagnose.door",
-    "next_test": "elevon.nexttest.door",
-    "next_inspection": "elevon.prognose.door",
-    "predict": "elevon.prognose.door",
-    "read_log": "elevon.logs.read",
-    "response": "elevon.doors",
-    "validate": "elevon.calibrate.door",
-    "Actuator": "elevon.actuator",
-    "Channel": "elevon.recording",
-    "Clock": "elevon.recording",
-    "ElevonError": "elevon.errors",
-    "ElevonWarning": "elevon.errors",
-    "Fmu": "elevon.session",
-    "InputError": "elevon.errors",
-    "NotActingWarning": "elevon.errors",
-    "Recording": "elevon.recording",
-    "Result": "elevon.results",
-    "Run": "elevon.simulate",
-    "Scenario": "elevon.scenario",
-    "list_actuators": "elevon.actuator",
-    "load": "elevon.results",
-    "load_campaign": "elevon.campaign",
-    "Session": "elevon.session",
-    "simulate": "elevon.simulate",
-    "simulate_batch": "elevon.simulate",
-}
+def _homes() -> dict[str, str]:
+    """Return each public name with its module, as the stub beside this file states them."""
+    lines = Path(__file__).with_suffix(".pyi").read_text("utf-8").splitlines()
+    imports = [line.split() for line in lines if line.startswith("from ")]
+    return {name: module for _, module, _, name, *_ in imports}
+
+
+_PUBLIC = _homes()
 
 __all__ = [  # noqa: PLE0604 - the two names resolved without a module come first
     "__version__",

@@ -16,7 +16,7 @@ from elevon.actuator import Actuator
 from elevon.calibrate.drops import is_drop_table, run_drops
 from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.validation import Validation
-from elevon.calibrate.ways import CalibrationRequest, way_of
+from elevon.calibrate.ways import CalibrationRequest, ValidationRequest, way_of
 from elevon.logs.read import LogsLike, as_logs
 from elevon.progress import Progress
 from elevon.simulate.arguments import ActuatorLike, as_actuator
@@ -122,4 +122,4 @@ def validate(
     """
     model = as_actuator(actuator)
     way = way_of(as_logs(logs), model, validating=True)
-    return way.validate(model, fidelity, transient, progress)
+    return way.validate(model, ValidationRequest(fidelity, transient), progress)

@@ -33,6 +33,14 @@ class CalibrationRequest:
     promise: bool = False
 
 
+@dataclass(frozen=True)
+class ValidationRequest:
+    """How it is to be held against logs; see `elevon.calibrate.door.validate`."""
+
+    fidelity: str = "low"
+    transient: float | None = None
+
+
 class CalibrationWay(Protocol):
     """Logs of one kind, ready to be calibrated to and validated with."""
 
@@ -42,11 +50,7 @@ class CalibrationWay(Protocol):
         """Estimate what the logs determine."""
 
     def validate(
-        self,
-        actuator: Actuator,
-        fidelity: str,
-        transient: float | None,
-        progress: Progress | None,
+        self, actuator: Actuator, request: ValidationRequest, progress: Progress | None
     ) -> Validation:
         """Hold an actuator against the logs."""
 
@@ -149,15 +153,12 @@ class _Signals:
         return _with(replace(result, promise=agreement), *texts)
 
     def validate(
-        self,
-        actuator: Actuator,
-        fidelity: str,
-        transient: float | None,
-        progress: Progress | None,
+        self, actuator: Actuator, request: ValidationRequest, progress: Progress | None
     ) -> Validation:
         return validate(
-            self.logs, actuator, fidelity=fidelity, transient=transient, progress=progress
-        )
+            self.logs, actuator, fidelity=request.fidelity, transient=request.transient,
+            progress=progress,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -194,13 +195,12 @@ class _ClosedLoop:
     def validate(
         self,
         actuator: Actuator,
-        fidelity: str,  # noqa: ARG002 - its runs are of the low one
-        transient: float | None,
-        progress: Progress | None,  # noqa: ARG002 - a few runs
+        request: ValidationRequest,
+        progress: Progress | None,  # noqa: ARG002 - a few runs, of the low fidelity
     ) -> Validation:
         from elevon.calibrate.stages.closed_loop.predict import validate_loop
 
-        return validate_loop(self.logs, actuator, transient)
+        return validate_loop(self.logs, actuator, request.transient)
 
 
 def _check_loop(actuator: Actuator, request: CalibrationRequest) -> None:
@@ -279,7 +279,7 @@ class _Balances:
 
         def validated(name: str, fitted: Actuator, progress: Progress | None) -> Validation:
             way = replace(self, given=[by_name[name]])
-            return way.validate(fitted, "low", None, progress)
+            return way.validate(fitted, ValidationRequest(), progress)
 
         try:
             promise, apart = held_out_logs(names, result.actuator, without, validated)
@@ -288,20 +288,17 @@ class _Balances:
         return _with(replace(result, promise=promise), *([] if apart else [_FROM_THE_FIT]))
 
     def validate(
-        self,
-        actuator: Actuator,
-        fidelity: str,
-        transient: float | None,
-        progress: Progress | None,
+        self, actuator: Actuator, request: ValidationRequest, progress: Progress | None
     ) -> Validation:
         from elevon.calibrate.replay import validate_replay
 
         if not self.unit:
-            return _ClosedLoop(self.given).validate(actuator, fidelity, transient, progress)
+            return _ClosedLoop(self.given).validate(actuator, request, progress)
         named = [(log.name, _recording(log)) for log in self.given]
         return validate_replay(
-            named, actuator, fidelity=fidelity, transient=transient, progress=progress
-        )
+            named, actuator, fidelity=request.fidelity, transient=request.transient,
+            progress=progress,
+        )  # fmt: skip
 
 
 def _with(result: Calibration, *texts: str) -> Calibration:
