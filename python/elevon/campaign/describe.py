@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,17 @@ import numpy.typing as npt
 
 from elevon.campaign.dataset import Dataset
 from elevon.errors import InputError
+from elevon.plain import fields_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 _BINS = 20
+#: What a description takes over from the manifest.
+_STATED = (
+    "name", "text", "status", "actuator", "fidelity", "version", "plan_hash", "responses", "design",
+    "not_acting", "sources",
+)  # fmt: skip
 
 
 def describe(ds: Dataset) -> dict[str, object]:
@@ -33,13 +40,7 @@ def describe(ds: Dataset) -> dict[str, object]:
     reasons = table["reason"].to_pylist()
     manifest = ds.manifest
     return {
-        "name": manifest.name,
-        "text": manifest.text,
-        "status": manifest.status,
-        "actuator": manifest.actuator,
-        "fidelity": manifest.fidelity,
-        "version": manifest.version,
-        "plan_hash": manifest.plan_hash,
+        **fields_of(manifest, *_STATED),
         "runs": len(ds),
         "bytes": sum(about["bytes"] for item in ds.items for about in item.files.values()),
         "statuses": counted(status),
@@ -61,19 +62,12 @@ def describe(ds: Dataset) -> dict[str, object]:
             {"name": c["name"], "rate": c["rate"], "columns": c["columns"]} for c in manifest.clocks
         ],
         "features": _features(ds),
-        "responses": manifest.responses,
-        "design": manifest.design,
-        "not_acting": manifest.not_acting,
-        "sources": manifest.sources,
     }
 
 
 def counted(items: Sequence[str]) -> dict[str, int]:
     """Return how often each text occurs, in order of the first."""
-    counts: dict[str, int] = {}
-    for item in items:
-        counts[item] = counts.get(item, 0) + 1
-    return counts
+    return dict(Counter(items))
 
 
 def distribution(column: pa.ChunkedArray) -> dict[str, object]:

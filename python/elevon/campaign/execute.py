@@ -12,6 +12,7 @@ from typing import Any
 
 from elevon.campaign.block import check_there, finish_block, simulate_block
 from elevon.campaign.check import check
+from elevon.campaign.describe import counted
 from elevon.campaign.estimate import Cost, estimate
 from elevon.campaign.folder import CampaignWork, begin, finish, finished, open_folder
 from elevon.campaign.resolved import Resolved
@@ -48,10 +49,7 @@ class CampaignResult:
     @property
     def counts(self) -> dict[str, int]:
         """Number of runs by status."""
-        counts: dict[str, int] = {}
-        for status in self.outcome["status"]:
-            counts[status] = counts.get(status, 0) + 1
-        return counts
+        return counted(self.outcome["status"])
 
     @property
     def failed(self) -> list[int]:

@@ -27,12 +27,18 @@ from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
 from elevon.parameters import ParameterSet
 from elevon.parameters.parameter import Parameter
+from elevon.plain import fields_of
 from elevon.retired import current, mapped
 from elevon.transaction import located
 from elevon.worklog import Item
 
 LONGEST = 2**30
 """Bytes of a resolved plan."""
+_COPIED = (
+    "name", "text", "fidelity", "record", "features", "scenario", "responses", "allow_not_acting",
+    "runs_per_file", "files", "sources", "design",
+)  # fmt: skip
+_COLUMN = ("name", "kind", "unit", "role", "attributes", "profile")
 SPLIT_IS_NO_PART = 3
 """First version whose hash leaves the split out: runs can be dealt anew."""
 
@@ -42,28 +48,13 @@ def resolved_text(resolved: Resolved) -> str:
     actuator = resolved.actuator
     content = {
         "schema": SCHEMA,
-        "name": resolved.name,
-        "text": resolved.text,
-        "fidelity": resolved.fidelity,
-        "record": resolved.record,
-        "features": resolved.features,
+        **fields_of(resolved, *_COPIED, "split"),
         "actuator": {
-            "name": actuator.name,
-            "title": actuator.title,
-            "wiring": actuator.wiring,
-            "references": dict(actuator.references),
+            **fields_of(actuator, "name", "title", "wiring", "references"),
             "parameters": [asdict(item) for item in actuator.parameters.values()],
         },
-        "scenario": resolved.scenario,
         "variants": [asdict(variant) for variant in resolved.variants],
-        "columns": [_about(column) for column in resolved.columns],
-        "responses": resolved.responses,
-        "allow_not_acting": resolved.allow_not_acting,
-        "runs_per_file": resolved.runs_per_file,
-        "files": resolved.files,
-        "sources": resolved.sources,
-        "design": resolved.design,
-        "split": resolved.split,
+        "columns": [fields_of(column, *_COLUMN) for column in resolved.columns],
     }
     return json.dumps(content, indent=1) + "\n"
 
@@ -91,17 +82,6 @@ def _bytes(values: Any) -> bytes:
         return json.dumps(values.tolist()).encode()
     raw: bytes = np.ascontiguousarray(values).tobytes()
     return raw
-
-
-def _about(column: Column) -> dict[str, Any]:
-    return {
-        "name": column.name,
-        "kind": column.kind,
-        "unit": column.unit,
-        "role": column.role,
-        "attributes": column.attributes,
-        "profile": column.profile,
-    }
 
 
 def read_resolved(folder: Path, manifest: Manifest | None = None) -> Resolved:
@@ -147,9 +127,6 @@ def _checked(content: Mapping[str, Any], table: Any) -> tuple[Resolved, str]:
     return resolved, _hash(content, resolved)  # the values are the same under either name
 
 
-_COPIED = ("name", "text", "fidelity", "record", "features", "scenario", "responses")
-
-
 def rebuilt(content: Mapping[str, Any], table: Any) -> Resolved:
     """Return the resolved plan of its JSON content and of the table of the runs."""
     data = content["actuator"]
@@ -161,12 +138,9 @@ def rebuilt(content: Mapping[str, Any], table: Any) -> Resolved:
         title=data["title"],
         references=data["references"],
     )
-    copied = {c: content[c] for c in _COPIED}
-    keys = ("allow_not_acting", "runs_per_file", "files", "sources", "design")
     variants = [CaseChanges(**item) for item in content["variants"]]
     return Resolved(
-        **copied,
-        **{key: content[key] for key in keys},
+        **{key: content[key] for key in _COPIED},
         split=content.get("split", {}),
         actuator=actuator,
         variants=variants,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from elevon.cli import campaign_analysis, interrupt
 from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
+from elevon.plain import fields_of
 
 app = group("Run plans of many labelled simulations.")
 campaign_analysis.add_to(app)
@@ -36,17 +38,14 @@ def plan(
     need = estimate(resolved, checked, Path(), checked_threads(threads))
     data = {
         "status": "ok",
-        "name": resolved.name,
+        **fields_of(resolved, "name", "responses", "design"),
         "runs": len(resolved),
         "blocks": need.blocks,
-        "estimate": need.to_dict(),
+        "estimate": need,
         "columns": [
-            {"name": c.name, "kind": c.kind, "unit": c.unit, "role": c.role}
-            for c in resolved.columns
+            fields_of(column, "name", "kind", "unit", "role") for column in resolved.columns
         ],
         "splits": _counted(resolved.index.split),
-        "responses": resolved.responses,
-        "design": resolved.design,
         "not_acting": checked.idle,
     }
     return Answer(data, lambda: _print_plan(resolved, need, checked.idle))
@@ -149,7 +148,6 @@ def _status(folder: Path) -> dict[str, Any]:
     from elevon.worklog import is_locked
 
     ds = load_campaign(folder)
-    counts: dict[str, int] = {}
     log = work_log(folder, ds.manifest)
     if ds.manifest.status == "running":
         ended = [] if log is None else [s for i in log.items.values() for s in i.data["status"]]
@@ -157,8 +155,7 @@ def _status(folder: Path) -> dict[str, Any]:
         ended = ds.runs.to_arrow(["status"])["status"].to_pylist()
     counts = _counted(ended)
     return {
-        "status": ds.manifest.status,
-        "name": ds.manifest.name,
+        **fields_of(ds.manifest, "status", "name"),
         "runs": len(ds),
         "done": len(ended),
         "failed": counts.get("diverged", 0) + counts.get("refused", 0),
@@ -201,20 +198,13 @@ def _summary(result: Any, out: Path) -> dict[str, Any]:
     manifest = result.manifest
     fresh = manifest.total - result.skipped
     return {
-        "status": manifest.status,
-        "name": manifest.name,
-        "runs": manifest.total,
+        **fields_of(manifest, "status", "name", "not_acting", runs="total"),
+        **fields_of(result, "counts", "skipped", "wall_s", "bytes", failed_runs="failed"),
         "failed": len(result.failed),
-        "failed_runs": result.failed,
-        "counts": result.counts,
-        "skipped": result.skipped,
-        "wall_s": result.wall_s,
         "runs_per_hour": 3600.0 * fresh / result.wall_s,
-        "bytes": result.bytes,
         "bytes_per_run": result.bytes / manifest.total,
         "sim_s": sum(result.outcome["sim_s"]),
         "blocks": len(manifest.blocks),
-        "not_acting": manifest.not_acting,
         "out": out,
     }
 
@@ -231,11 +221,7 @@ def _print(result: Any, out: Path) -> None:
 
 
 def _counted(items: Any) -> dict[str, int]:
-    counts: dict[str, int] = {}
-    for item in items:
-        if item:
-            counts[str(item)] = counts.get(str(item), 0) + 1
-    return counts
+    return dict(Counter(str(item) for item in items if item))
 
 
 def _range(column: Any) -> str:

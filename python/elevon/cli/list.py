@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.cli.acting import by_drive, check, chosen
 from elevon.cli.groups import group
-from elevon.cli.output import fields_of, print_table
+from elevon.cli.output import print_table
 from elevon.cli.shell import Answer, command
+from elevon.plain import fields_of
 
 if TYPE_CHECKING:
     from elevon.faults import FaultRecord

@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING, Any
 from elevon.cli import interrupt
 from elevon.cli.output import say
 from elevon.errors import InputError
-from elevon.plain import plain
+from elevon.plain import fields_of, plain
 from elevon.results import finite
 
 if TYPE_CHECKING:
@@ -120,15 +120,10 @@ def _end(watch: Monitor, reader: StreamReader) -> None:
     _line(
         {
             "event": "end",
-            "status": result.status,
             "ended": "in mid-line" if reader.cut_off else "whole",
             "bytes_left_out": reader.cut_off,
-            "windows": watch.windows,
-            "skipped": dict(watch.skipped),
-            "samples": watch.samples,
-            "top": watch.top,
-            "alarm": watch.alarm,
-            "findings": result.findings,
+            **fields_of(result, "status", "findings"),
+            **fields_of(watch, "windows", "skipped", "samples", "top", "alarm"),
         }
     )
 

@@ -15,6 +15,7 @@ from elevon.parameters.design import Given, derive, quantities
 from elevon.parameters.design.quantities import read_number
 from elevon.parameters.design.write import design_text
 from elevon.parameters.find import base_reference, find_set
+from elevon.plain import fields_of
 
 _WIRING = {"--linear": "ballscrew", "--rotary": "rotary"}
 
@@ -53,12 +54,7 @@ class NewFiles:
     def data(self) -> dict[str, Any]:
         """Return what ``--json`` prints."""
         design = {
-            name: {
-                "value": item.value,
-                "text": item.text,
-                "source": item.source,
-                "given": name in self.given,
-            }
+            name: fields_of(item, "value", "text", "source") | {"given": name in self.given}
             for name, item in self.actuator.design.items()
         }
         bench = None if self.bench is None else str(self.bench)

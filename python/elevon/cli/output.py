@@ -16,12 +16,6 @@ from elevon.plain import plain
 from elevon.results import finite
 
 
-def fields_of(record: object, *names: str, **renamed: str) -> dict[str, Any]:
-    """Return fields of a record as JSON's types, some under another key: ``key=field``."""
-    keys = dict.fromkeys(names) | renamed
-    return {key: plain(getattr(record, field or key)) for key, field in keys.items()}
-
-
 def print_json(value: Mapping[str, Any]) -> None:
     """Write one JSON object, and nothing else, on stdout; with it the command has answered."""
     text = json.dumps(finite(plain(value)), allow_nan=False, indent=2) + "\n"

@@ -9,8 +9,9 @@ import typer
 
 from elevon.cli import common
 from elevon.cli.acting import check, chosen
-from elevon.cli.output import fields_of, print_table, say
+from elevon.cli.output import print_table, say
 from elevon.cli.shell import Answer, command
+from elevon.plain import fields_of
 
 app = typer.Typer(rich_markup_mode=None)
 

@@ -2,7 +2,7 @@
 
 from elevon.plain.fields import REMAINDER, STORED, WORKING, As, in_unit, key
 from elevon.plain.read import read_plain
-from elevon.plain.record import Plain, keys_of, plain, units_of
+from elevon.plain.record import Plain, fields_of, keys_of, plain, units_of
 
 __all__ = [
     "REMAINDER",
@@ -10,6 +10,7 @@ __all__ = [
     "WORKING",
     "As",
     "Plain",
+    "fields_of",
     "in_unit",
     "key",
     "keys_of",

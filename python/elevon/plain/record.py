@@ -81,6 +81,12 @@ def plain(value: object, *, stored: bool = True) -> Any:
     return {str(name): plain(item, stored=stored) for name, item in table.items()}
 
 
+def fields_of(record: object, *names: str, **renamed: str) -> dict[str, Any]:
+    """Return fields of a record as JSON's types, some under another key: ``key=field``."""
+    keys = dict.fromkeys(names) | renamed
+    return {key: plain(getattr(record, field or key)) for key, field in keys.items()}
+
+
 def _as_table(value: Any, stored: bool) -> Mapping[Any, Any] | None:
     if isinstance(value, Plain):
         return value.to_dict(stored=stored)
