@@ -5,55 +5,14 @@ it is refused like any unknown name, with the present name first among the sugge
 """
 
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
-#: Old name, as a whole or up to the next dot or ``@``, to the present one.
-_NAMES = {
-    "play": "backlash",
-    "user": "output",
-    "user_position": "output_position",
-    "user_speed": "output_speed",
-    "user_torque": "output_torque",
-    "play_in_deg": "backlash_in_deg",
-    "play_out_deg": "backlash_out_deg",
-    "play_out_spread_deg": "backlash_out_spread_deg",
-    "play_from_encoder": "backlash_from_encoder",
-    "plays_differ": "backlashes_differ",
-    "total_play": "total_backlash",
-    "equivalents": "ambiguous_with",
-    "evidence": "features",
-    "winding_short": "resolver_short",
-    "winding_open": "resolver_open",
-}
-
-#: Words that people try, to the names that they may mean; those that fit the place are offered.
-_TRIED = {
-    "freeplay": ("backlash",),
-    "free_play": ("backlash",),
-    "lash": ("backlash",),
-    "winding_short": ("short",),
-    "turn_short": ("short",),
-    "wear": ("tooth_wear", "backlash"),
-    "stiction": ("friction",),
-    "bearing_wear": ("bearing",),
-}
-
-#: What is to be said about a word of a kind of name, beside the suggestions.
-_REMARKS = {("fault", "overheat"): "not a fault: see thermal"}
-
-#: Old names inside a text: those that no other word is, each with the present spelling.
-_INSIDE = (
-    (re.compile(r"(?<![\w.@])user_(position|speed|torque)(?!\w)"), r"output_\1"),
-    (re.compile(r"(?<![\w.@])play(?=@transmission)"), "backlash"),
-    (
-        re.compile(r"(?<![\w.@])play(?=\.(?:total|extra|model|stiffness|damping)(?!\w))"),
-        "backlash",
-    ),
-    (re.compile(r"(?<![\w.@])winding_(short|open)(?=@sensor\.resolver)"), r"resolver_\1"),
-    (re.compile(r"(?<![\w.@])load\.user(?!\w)"), "load.output"),
-    (re.compile(r"(?<!\w)user (position|speed|torque)(?!\w)"), r"output \1"),
-)
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+_NAMES: Mapping[str, str] = _TABLE["names"]
+_INSIDE = [(re.compile(row["pattern"]), row["name"]) for row in _TABLE["inside"]]
 
 
 def current(text: str) -> str:
@@ -98,7 +57,7 @@ def successors(name: str, candidates: Iterable[str]) -> list[str]:
     head, mark, tail = re.match(r"([^.@=]*)([.@=]?)(.*)", word, re.DOTALL).groups()  # type: ignore[union-attr]
     meant = [current(word)] if current(word) != word else []
     meant += [_NAMES[word]] if word in _NAMES else []
-    for new in (_NAMES.get(head), *_TRIED.get(head, ())):
+    for new in (_NAMES.get(head), *_TABLE["tried"].get(head, ())):
         meant += [] if new is None else [f"{new}{mark}{tail}", new]
     names = list(candidates)
     meant = list(dict.fromkeys(meant))
@@ -108,4 +67,4 @@ def successors(name: str, candidates: Iterable[str]) -> list[str]:
 
 def remark(what: str, name: str) -> str:
     """Return what is to be said about a wrong name of a kind, such as a fault; mostly nothing."""
-    return _REMARKS.get((what, name.strip().lower()), "")
+    return str(_TABLE["remarks"].get(what, {}).get(name.strip().lower(), ""))
