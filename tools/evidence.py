@@ -9,9 +9,11 @@
 Each record, docs/evidence/runs/NAME.json, has the command, the day, the commit and the checks as
 the command printed them. A page shows one between `<!-- run NAME -->` (a sentence) or
 `<!-- checks NAME -->` (a table) and `<!-- end -->`; `make docs` makes a page of all of them.
+`<!-- judged NAME -->` stands for the last row of runs/judged.csv whose command has that word.
 """
 
 import argparse
+import csv
 import datetime
 import json
 import re
@@ -30,7 +32,7 @@ CASES = (
     "pisa-friction", "pisa-hydraulic", "nasa-faults", "nasa-flight", "pisa-validation",
     "pisa-commutation",
 )  # fmt: skip
-BLOCK = re.compile(r"^<!-- (run|checks) (\S+) -->\n.*?^<!-- end -->$", re.M | re.S)
+BLOCK = re.compile(r"^<!-- (run|checks|judged) (\S+) -->\n.*?^<!-- end -->$", re.M | re.S)
 
 
 def main(arguments: list[str]) -> int:
@@ -97,6 +99,8 @@ def filled(text: str) -> str:
 
 
 def _block(form: str, name: str) -> str:
+    if form == "judged":
+        return _judged(name)
     run = kept(name)
     checks = [dict(check) for check in run["checks"]]  # type: ignore[attr-defined]
     missed = [check for check in checks if not check["passed"]]
@@ -109,6 +113,14 @@ def _block(form: str, name: str) -> str:
         )
     lines = [f"* not met: {c['name']}: {_value(c)} ({_limit(c)})" for c in missed]
     return "\n".join([text, *lines, ""]) if lines else text
+
+
+def _judged(name: str) -> str:
+    lines = [
+        line for line in (RUNS / "judged.csv").read_text("utf-8").splitlines() if line[:1] != "#"
+    ]
+    row = [row for row in csv.DictReader(lines) if name in row["command"].split()][-1]
+    return f"`{row['command']}`, {row['date']}, commit `{row['commit']}`, run once.\n"
 
 
 def _value(check: dict[str, object]) -> str:
