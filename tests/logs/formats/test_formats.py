@@ -11,11 +11,13 @@ import pytest
 from scipy.io import netcdf_file, savemat
 
 from elevon.errors import FormatError, InputError
+from elevon.logs.formats import text
 from elevon.logs.formats.cranfield import DATA_DOI, read_cranfield
 from elevon.logs.formats.detect import file_kind, read_table
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.matlab import read_matlab
+from elevon.logs.formats.text import LineReader, read_text_table
 from elevon.logs.importing import import_log
 
 SMALL = Limits(values=20_000)
@@ -308,3 +310,40 @@ def test_a_long_matrix_is_its_columns(tmp_path, name):
     assert list(table.columns) == ["data_1", "data_2"]
     np.testing.assert_array_equal(np.column_stack(list(table.columns.values())), data)
     assert any("passed over" in note for note in table.notes)
+
+
+ODD = {
+    "plain": "1,2,3",
+    "empty cell": "1,,3",
+    "exponent": "-1.5e-3,+2,3E4",
+    "spaces": "1, 2,3",
+    "words": "1,nan,3",
+    "blank": "",
+    "carriage return": "1,2,3\r",
+    "delimiter at the end": "1,2,3,",
+}
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_blocks_of_plain_numbers_are_read_as_line_by_line(tmp_path, monkeypatch, kind):
+    """A strange line in the second of three blocks."""
+    monkeypatch.setattr(text, "_BLOCK", 600)
+    rows = [f"{k},{k / 7!r},{-(k**9)}e-300" for k in range(60)]
+    rows[25] = ODD[kind]
+    path = tmp_path / "log.csv"
+    path.write_bytes(("a,b,c\n" + "\n".join(rows) + "\n").encode())
+    fast = read_text_table(path)
+    monkeypatch.setattr(LineReader, "_plain", lambda *_: False)
+    slow = read_text_table(path)
+    assert fast.notes == slow.notes
+    for name, values in slow.columns.items():
+        assert np.array_equal(fast.columns[name], values, equal_nan=True)
+
+
+@pytest.mark.parametrize("odd", ["1,2", "1,2,3,4", "1,2-,3", "1,2,x", "1,1_0,2"])
+def test_a_strange_line_is_refused_by_its_number(tmp_path, monkeypatch, odd):
+    monkeypatch.setattr(text, "_BLOCK", 100)
+    path = tmp_path / "log.csv"
+    path.write_text("a,b,c\n" + "1,2,3\n" * 40 + f"{odd}\n" + "1,2,3\n" * 40)
+    with pytest.raises(FormatError, match=r"line 42\b"):
+        read_text_table(path)
