@@ -279,7 +279,7 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
         answer(unit, gaps)
     with pytest.raises(UnknownNameError):
         answer(unit, logs["healthy"], faults=["backlash@moon"])
-    with pytest.raises(InputError, match="not modelled: with it"):
+    with pytest.raises(InputError, match="not modelled: not in the reduced-order model"):
         answer(unit, logs["healthy"], faults=["open_phase@motor.phase_a"])
 
 
