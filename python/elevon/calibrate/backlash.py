@@ -161,8 +161,10 @@ def _fitted(positions: _Positions, count: float) -> BacklashFit:
     covariance, degrees = best.covariance(numbered_strokes(strokes, best.weight * best.residual))
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     value = np.append(abs(best.x[0]), best.x[1:])
-    estimates = ((float(v), float(s)) for v, s in zip(value, std, strict=True))
-    return BacklashFit(*estimates, degrees, rms, positions.reach, positions.names)
+    backlash, offset, gain, delay = ((float(v), float(s)) for v, s in zip(value, std, strict=True))
+    return BacklashFit(
+        backlash, offset, gain, delay, degrees, rms, positions.reach, positions.names
+    )
 
 
 def _spanned(positions: _Positions, *, count: float, rms: float) -> BacklashFit:

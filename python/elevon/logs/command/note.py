@@ -35,7 +35,9 @@ _MOST_TERMS = 1000
 _MOST_TABLE = 50_000_000  # bytes of a table's file
 _KEYS = packaged_toml("elevon.logs.command", "keys.toml")
 _KINDS: Mapping[str, str] = _KEYS["units"]
-_SPELLINGS = {other: name for name, others in _KEYS["spellings"].items() for other in others}
+_SPELLINGS: Mapping[str, str] = {
+    other: name for name, others in _KEYS["spellings"].items() for other in others
+}
 _SUFFIX = re.compile(r"_(?:deg|degrees|hz|s|sec|seconds|m|deg_s|deg_per_s)$")
 _BRAKE = {"on": True, "true": True, "yes": True, "off": False, "false": False, "no": False}
 

@@ -106,7 +106,7 @@ def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
     entry.role = "time"
     entry.reasons.append("named as time" if named else "rises throughout, most evenly")
     settle_time_unit(entry, table, columns)
-    scale = TIME_UNITS.get(entry.unit, 1.0)
+    scale = TIME_UNITS.get(entry.unit or "", 1.0)
     return np.asarray(evened(table.columns[name]) * scale, dtype=np.float64)
 
 
@@ -140,7 +140,7 @@ def _in_units(name: str, hints: Mapping[str, str], columns: Mapping[str, Guessed
 
 def _drop_odd_unit(item: GuessedColumn) -> None:
     """Forget a unit that no signal in this role can have: the header was misread."""
-    if not item.unit or item.role not in known_roles():
+    if not item.unit or item.role is None or item.role not in known_roles():
         return
     dimension = parse_unit(item.unit).dimension
     units = known_roles()[item.role].units
