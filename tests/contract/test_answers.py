@@ -5,7 +5,7 @@ import re
 import pytest
 
 from elevon.cli import main
-from tests.harness.recipes import DESIGN, FLIGHT, LABELS, LOG, PLAN, SCENARIO
+from tests.harness.recipes import DESIGN, FLIGHT, FLY, LABELS, LOG, PLAN, SCENARIO
 from tests.harness.registry import commands, shared_writer
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -61,6 +61,8 @@ ANSWERS = {
     "bench list": ((), r"^(name|procedure)", (), False),
     "bench run": (("log.toml", *ROTARY, "--fidelity", "low", "--out", "other"),
                   r"^log: 1 of 1 logs made", (), False),
+    "bench fly": (("fly.toml", "--actuator", "nasa-ballscrew", "--fidelity", "low", "--out",
+                   "flown", "--switch", "0.5 s"), r"^2 logs, 4 files in flown$", (), False),
     "design spring": ((), r"^The spring (holds|does not hold)", (), False),
     "loads": (("flight.csv", "--area", "0.5 m2", "--chord", "400 mm", "--c-delta", "-0.4",
                "--actuator", "nasa-ballscrew", "--arm", "100 mm", "--out", "load.toml"),
@@ -112,6 +114,7 @@ FILES = {
     "log.toml": LOG,
     "watch.toml": LOG.replace('"4 s"', '"16 s"'),
     "flight.csv": FLIGHT,
+    "fly.toml": FLY,
     "labels.csv": LABELS,
 }
 

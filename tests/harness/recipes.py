@@ -68,6 +68,17 @@ LABELS = "log,label,unit\n" + "".join(
     for k, name in enumerate("abcdef")
 )
 
+FLY = """
+duration = "1 s"
+[[command.terms]]
+kind = "sine"
+amplitude = "5 mm"
+frequency = "1 Hz"
+[[load.output.terms]]
+kind = "constant"
+value = "2 kN"
+"""
+
 FLIGHT = """time [s],altitude [m],true_airspeed [m/s],angle_of_attack [deg],deflection [deg]
 0,1000,100,2,0
 1,1000,100,2,5
@@ -177,6 +188,10 @@ RECIPES = {
                         {"log.toml": LOG},
                         (("bench", "run", "log.toml", *ROTARY, "--fidelity", "low", "--out",
                           "logs", "--seed", "5"),)),
+    "bench fly": Recipe(("fly.toml", "--actuator", "nasa-ballscrew", "--fidelity", "low", "--out",
+                         "flown", "--switch", "0.5 s", "--force"), {"fly.toml": FLY},
+                        (("bench", "fly", "fly.toml", "--actuator", "nasa-ballscrew", "--fidelity",
+                          "low", "--out", "flown", "--switch", "0.5 s", "--seed", "5"),)),
     "loads": Recipe(("flight.csv", "--area", "0.5 m2", "--chord", "400 mm", "--c-delta", "-0.4",
                      "--actuator", "nasa-ballscrew", "--arm", "100 mm", "--out", "load.toml",
                      "--force"), {"flight.csv": FLIGHT}),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,13 +18,16 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
 from elevon.bench.force_control import ForceLoop
+from elevon.bench.loaded import waveform_values, write_loaded
 from elevon.bench.stand import Stand, stand_of
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault
+from elevon.files import check_output
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario import Scenario
 from elevon.simulate import Run, simulate_batch, solver_step
+from elevon.worklog import locked, sweep
 
 UNITS = ("nominal", "faulty")
 SWITCH = 10.0
@@ -152,6 +156,35 @@ def fly(
     return first, second
 
 
+def claim_flight(folder: Path, *, force: bool = False) -> None:
+    """Refuse a folder that has logs of a flight, before one is flown."""
+    for name in UNITS:
+        check_output(folder / f"{name}.csv", force=force)
+
+
+def write_flight(folder: Path, logs: Sequence[FlightLog], *, force: bool = False) -> list[Path]:
+    """Write what the stand records of both actuators, each a log with its roles beside it.
+
+    Returns
+    -------
+    list of Path
+        ``nominal.csv``, ``faulty.csv`` and their descriptions.
+
+    Raises
+    ------
+    BusyError
+        Another process works in the folder.
+    OutputExistsError, OutputError
+        As `elevon.Recording.save`; nothing is written where one of them is there.
+    """
+    with locked(folder):
+        sweep(folder)
+        claim_flight(folder, force=force)
+        return [
+            path for log in logs for path in write_loaded(folder, log.unit, log.log, force=force)
+        ]
+
+
 def _check(actuator: Actuator, stand: Stand, switch: float, *, loaded: bool) -> None:
     if stand.force is None or "load.mass" not in actuator.parameters:
         raise InputError(f"{actuator.name}: stands on {stand.name}, which has no load actuator")
@@ -169,8 +202,6 @@ def _acceleration(aircraft: FlightConditions, time: Floats, seed: int) -> Floats
 
 def _forces(stand: Stand, flight: Scenario, time: Floats, switch: float) -> list[Floats]:
     """Return what the load actuator does to each ram [N]."""
-    from elevon.bench.loaded import waveform_values
-
     assert stand.force is not None
     load = waveform_values(flight.loads.output.terms, time)
     position = waveform_values(flight.command.terms, time, unit="m")

@@ -79,6 +79,48 @@ def run(
     return Answer(result, lambda: _print(result, out))
 
 
+@command(app)
+def fly(
+    flight: Path,
+    *,
+    actuator: str,
+    out: Path,
+    fault: list[str] | None = None,
+    settings: list[str] | None = None,
+    load_factor: float = 0.0,
+    vibration: str = "0 m/s2",
+    switch: str = "10 s",
+    seed: int = 0,
+    fidelity: str = "high",
+    force: bool = False,
+) -> Answer:
+    """Fly a nominal and a faulty actuator under one load, switched between them in flight."""
+    from elevon.bench.flyable import FlightConditions, claim_flight, write_flight
+    from elevon.bench.flyable import fly as flown
+    from elevon.cli.fault_options import read_faults
+    from elevon.scenario import Scenario
+    from elevon.units import parse_quantity
+
+    unit = common.read_actuator(actuator, settings)
+    aircraft = FlightConditions(load_factor, parse_quantity(vibration, "m/s2", "--vibration"))
+    claim_flight(out, force=force)
+    with progress_bar("flying") as advance:
+        logs = flown(
+            unit, Scenario.load(flight), read_faults(fault, unit.wiring), aircraft,
+            switch=parse_quantity(switch, "s", "--switch"), seed=seed, fidelity=fidelity,
+            progress=advance,
+        )  # fmt: skip
+    files = write_flight(out, logs, force=force)
+    rows = [{"unit": log.unit, "share_loaded": log.loaded} for log in logs]
+
+    def show() -> None:
+        answer(f"{len(logs)} logs, {len(files)} files in {out}")
+        cells = [(log.unit, f"{100.0 * log.loaded:.0f} %", f"{log.unit}.csv") for log in logs]
+        print_table(("unit", "bears the load", "log"), cells)
+
+    return Answer({"status": "ok", "logs": rows, "files": [str(path) for path in files]}, show)
+
+
 def _print(result: BenchResult, out: Path) -> None:
     rows = [
         (
