@@ -73,7 +73,7 @@ class FaultBank:
         self._keys = (share * (1.0 - 1e-12) + np.arange(count)[:, None]).ravel()
         self._pace = np.diff(shapes.level) / np.diff(shapes.clock, axis=1)
         self._slope = np.gradient(shapes.damage, shapes.level)
-        self._life = shapes.life()
+        self._life, self._span = shapes.life(), shapes.span_of_damage
         slope = float(np.interp(shapes.start, shapes.level, self._slope))
         self._start_spread = start_spread / max(slope, 1e-12)
         self.renew(known=False)
@@ -144,7 +144,9 @@ class FaultBank:
         slope = np.interp(after, shapes.level, self._slope)  # damage over level
         grown = np.maximum(after - level, 0.0)
         cov[..., 0, 0] += shapes.grain[row] * grown / np.maximum(slope, 1e-12)
-        cov[..., 1, 1] += shapes.drift[row] ** 2 * lives
+        # Where growth hastens, most of it lies in a small part of the life: rates drift with both.
+        moved = np.maximum(lives, np.minimum(grown * slope / self._span, _LARGEST))
+        cov[..., 1, 1] += shapes.drift[row] ** 2 * moved
         for index, most in ((0, shapes.span**2), (1, _LOOSEST**2)):
             shrink = np.sqrt(np.minimum(most / np.maximum(cov[..., index, index], 1e-300), 1.0))
             cov[..., index, :] *= shrink[..., None]

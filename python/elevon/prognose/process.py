@@ -233,7 +233,7 @@ class Process:
         else:
             damage = damage + self._scattered(units, mean, rng)
             if self.wander:
-                growth = self._wandered(units, steps, rng)
+                growth = self._wandered(units, steps, mean, rng)
             if units.usage > 0.0 and not active.all():
                 folds = float(np.log1p(steps / units.usage))
                 active = active | (rng.random(active.shape) < -np.expm1(-ONSET * folds))
@@ -258,7 +258,9 @@ class Process:
                 out[:, k] = np.where(grain > 0.0, drawn, mean[:, k])
         return out
 
-    def _wandered(self, units: UnitPopulation, steps: float, rng: np.random.Generator) -> Floats:
+    def _wandered(
+        self, units: UnitPopulation, steps: float, mean: Floats, rng: np.random.Generator
+    ) -> Floats:
         """Return growth factors after a step: they drift, and now and then they bend."""
         growth = units.growth.copy()
         for k, (shapes, life) in enumerate(zip(self.shapes, self._lives, strict=True)):
@@ -267,7 +269,8 @@ class Process:
             normal = rng.standard_normal((3, len(units)))
             bend = rng.random(len(units)) < 2.0 * shapes.ahead[row] * lives
             side = np.where(normal[1] > 0.0, BEND, -BEND) + BEND_SPREAD * normal[2]
-            growth[:, k] += shapes.drift[row] * np.sqrt(lives) * normal[0] + bend * side
+            moved = np.maximum(lives, np.minimum(mean[:, k] / self.range[k], _LONGEST))
+            growth[:, k] += shapes.drift[row] * np.sqrt(moved) * normal[0] + bend * side
         return np.clip(growth, -GROWTHS, GROWTHS)
 
     def to(
