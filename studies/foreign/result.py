@@ -16,6 +16,8 @@ _COVERAGE = (0.85, 0.95)
 _ACCURACY, _WIDTH, _OFF_LAW = 0.62, 1.8, 0.05
 _WIENER = "Wiener, Kalman filter"
 _CRACKS = "Virkler"
+_ALL = "all foreign"
+_WINDINGS = "insulation"
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class ForeignResult:
         """Return figures of each method by density and form, and over all foreign forms."""
         out = []
         for density in sorted({r.density for r in self.judged}):
-            for form in [NAMED_LAW, *FORMS, _CRACKS, "all foreign"]:
+            for form in [NAMED_LAW, *FORMS, _CRACKS, _ALL]:
                 for law in self._laws(form):
                     for method in dict.fromkeys(r.method for r in self.judged):
                         rows = self.rows(method, _of(form, density, law))
@@ -56,13 +58,12 @@ class ForeignResult:
         return out
 
     def _laws(self, form: str) -> Sequence[str]:
+        """Return the laws whose predictions a form is split by; "" is all of them."""
         if form == _CRACKS:
             return sorted({r.law for r in self.judged if r.form == form})
-        return (
-            ["", *dict.fromkeys(r.law for r in self.judged if r.form == NAMED_LAW)]
-            if form == NAMED_LAW
-            else [""]
-        )
+        if form not in {NAMED_LAW, _ALL}:
+            return [""]
+        return ["", *dict.fromkeys(r.law for r in self.judged if r.form != _CRACKS)]
 
     def gaps(self) -> list[dict[str, Any]]:
         """Return by how much ours is more accurate than the best other method, form by form."""
@@ -82,8 +83,8 @@ class ForeignResult:
         """What must hold."""
         out = []
         for density in sorted({r.density for r in self.judged if r.form != _CRACKS}):
-            ours = judge(self.rows(OURS, _of("all foreign", density)))
-            wiener = judge(self.rows(_WIENER, _of("all foreign", density)))
+            ours = judge(self.rows(OURS, _of(_ALL, density)))
+            wiener = judge(self.rows(_WIENER, _of(_ALL, density)))
             named = self.rows(OURS, _of(NAMED_LAW, density))
             name = f"{density:g} times the inspections"
             out += [
@@ -92,6 +93,9 @@ class ForeignResult:
                 Check(f"median width over the Wiener filter's, {name}",
                       ours["width"] / wiener["width"], _WIDTH),
                 Check(f"accuracy, {name}", ours["accuracy"], _ACCURACY, at_least=True),
+                Check(f"coverage of windings by themselves, {name}",
+                      judge(self.rows(OURS, _of(_ALL, density, _WINDINGS)))["coverage"],
+                      _COVERAGE[0], at_least=True),
                 Check(f"own laws said to be off, {name}",
                       float(np.mean([r.status == "off_law" for r in named])), _OFF_LAW),
             ]  # fmt: skip
@@ -123,7 +127,7 @@ def _of(form: str, density: float | None = None, law: str = "") -> Callable[[Jud
     """Return what chooses the predictions of a form."""
 
     def chosen(r: Judged) -> bool:
-        right = r.form in FORMS if form == "all foreign" else r.form == form
+        right = r.form in FORMS if form == _ALL else r.form == form
         return right and density in (None, r.density) and law in ("", r.law)
 
     return chosen

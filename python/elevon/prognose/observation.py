@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elevon.diagnose.engine.answer import FaultPlace
 from elevon.diagnose.engine.candidates import CANDIDATES, CandidateFault
-from elevon.errors import InputError, quoted, unknown
+from elevon.errors import InputError
+from elevon.plain import Plain
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -127,8 +129,17 @@ def inspection(
     return Inspection(usage, seen, tuple(reset), name, date, measured or {})
 
 
-_CAUSE = ("kind", "place", "probability", "severity", "unit", "interval", "ambiguous_with")
-"""What `elevon diagnose` writes of a cause."""
+@dataclass(frozen=True)
+class _Cause(Plain):
+    """What a diagnosis writes of a cause; without `unit` it is the law's."""
+
+    kind: str
+    place: str
+    probability: float
+    severity: float
+    interval: tuple[float, float]
+    unit: str = ""
+    ambiguous_with: tuple[FaultPlace, ...] = ()
 
 
 def _common(kind: str, severity: float) -> float:
@@ -136,7 +147,7 @@ def _common(kind: str, severity: float) -> float:
     return float(np.hypot(relative * severity, absolute))
 
 
-def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] | None:
+def _cause(data: Mapping[str, Any], law: Law, place: str) -> _Cause | None:
     """Return the cause that is the law's fault, also by a place it is ambiguous with.
 
     A cause that is less likely than not is none: its severity is that of a guess.
@@ -144,31 +155,16 @@ def _cause(data: Mapping[str, Any], law: Law, place: str) -> Mapping[str, Any] |
     given = data.get("faults", [])
     if not isinstance(given, list):
         raise InputError(f"{place}: faults = {given!r} is not a list of causes")
-    for k, cause in enumerate(given):
-        names, probability = _named(cause, f"{place}: faults[{k}]")
-        if probability >= 0.5 and (law.kind, law.place) in names:
-            return dict(cause)
+    for k, item in enumerate(given):
+        cause = _Cause.from_dict(item, f"{place}: faults[{k}]")
+        if not 0.0 <= cause.probability <= 1.0:
+            raise InputError(
+                f"{place}: faults[{k}]: probability = {cause.probability:g} is outside 0 to 1"
+            )
+        names = (FaultPlace(cause.kind, cause.place), *cause.ambiguous_with)
+        if cause.probability >= 0.5 and (law.kind, law.place) in names:
+            return cause
     return None
-
-
-def _named(cause: Any, place: str) -> tuple[list[tuple[str, str]], float]:
-    """Return kind and place of a cause and of those like it, and its probability."""
-    for key in cause if isinstance(cause, Mapping) else ():
-        if key not in _CAUSE:
-            raise unknown("key", str(key), _CAUSE, place)
-    try:
-        names = [
-            (str(n["kind"]), str(n["place"])) for n in (cause, *cause.get("ambiguous_with", []))
-        ]
-        probability = float(cause["probability"])
-    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(
-            f"{place}: {quoted(str(cause))} has not kind, place and a number as probability, as "
-            "`elevon diagnose` gives them"
-        ) from error
-    if not 0.0 <= probability <= 1.0:
-        raise InputError(f"{place}: probability = {probability:g} is outside 0 to 1")
-    return names, probability
 
 
 def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
@@ -211,9 +207,9 @@ def _range(kind: str, place: str, unit: str) -> tuple[float, float]:
     return min(item.minimum for item in records), max(item.maximum for item in records)
 
 
-def _read(cause: Mapping[str, Any], law: Law, limit: float | None, edge: float, place: str) -> Seen:
+def _read(cause: _Cause, law: Law, limit: float | None, edge: float, place: str) -> Seen:
     severity, low, high = _numbers(cause, law, place)
-    if not (np.isfinite([severity, low, high]).all() and low <= severity <= high):
+    if not low <= severity <= high:
         raise InputError(f"{place}: severity {severity:g} is not within {low:g} to {high:g}")
     least, most = _range(law.kind, law.place, law.unit)
     if not least <= severity <= most:
@@ -230,16 +226,13 @@ def _read(cause: Mapping[str, Any], law: Law, limit: float | None, edge: float, 
     )
 
 
-def _numbers(cause: Mapping[str, Any], law: Law, place: str) -> list[float]:
+def _numbers(cause: _Cause, law: Law, place: str) -> list[float]:
     """Return severity and interval in the law's unit: the cause may state another of its kind."""
-    try:
-        given = [float(cause["severity"]), *(float(value) for value in cause["interval"])]
-        severity, low, high = given
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{place}: severity and interval are not numbers") from error
-    unit = cause.get("unit", law.unit)
-    if unit == law.unit or not np.isfinite(given).all():
-        return [severity, low, high]
-    if not isinstance(unit, str):
-        raise InputError(f"{place}: unit = {unit!r} is not a text")
-    return [parse_quantity(f"{value!r} {unit}", law.unit, f"{place}: unit") for value in given]
+    given = [cause.severity, *cause.interval]
+    if not np.isfinite(given).all():
+        raise InputError(f"{place}: severity and interval are not numbers")
+    if cause.unit in {"", law.unit}:
+        return given
+    return [
+        parse_quantity(f"{value!r} {cause.unit}", law.unit, f"{place}: unit") for value in given
+    ]
