@@ -247,7 +247,7 @@ def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
 def test_a_history_of_logs_is_diagnosed_on_the_way(elevon_cli, tmp_path):  # noqa: F811
     place = tmp_path / "unit"
     for k, use in enumerate((0, 500, 1000, 1500)):
-        fault = () if use == 0 else ("--fault", f"backlash@transmission={4e-6 * use!r}")
+        fault = () if use == 0 else ("--fault", f"backlash@transmission={4e-6 * use!r} rad")
         logs = []
         for test in ("backlash", "chirp"):
             options = ("--actuator", "torino-rotary", "--fidelity", "low", "--seed", k, *fault)

@@ -84,6 +84,11 @@ _KINDS = (
     _Kind((0, 0.28, 0.28), (0, 0.4, 0.4), (0, 0, 1e-4), (0, 0.03, 0.4), (0, 0.03, 0.4)),
     _Kind((0.03, 0, 0), (0.5, 0, 0.5), (0.01, 0, 0.01), (0.5, 0, 0.5), (0.5, 0, 0.5)),
 )
+#: Where a mission keeps its law alone, it is taken at its word.
+_ALONE = (
+    _Kind((0.96, 0, 0), (0.06, 0, 0), (0, 0, 0), (0.03, 0, 0), (0.005, 0, 0)),
+    _Kind((0.04, 0, 0), (0.5, 0, 0), (0.01, 0, 0), (0.5, 0, 0), (0.5, 0, 0)),
+)
 
 
 @dataclass(frozen=True)
@@ -266,11 +271,12 @@ def _of_each_kind(
     """Return each row once a kind; growth without a law is of the last kind alone."""
     (damage, level), (start, limit) = points, ends
     names, group, prior, clocks = rows
-    end, count = float(np.interp(limit, level, damage)) - law.start, len(_KINDS)
+    end, kinds = float(np.interp(limit, level, damage)) - law.start, _ALONE if law.only else _KINDS
+    count = len(kinds)
     none, last = np.array(names) == NO_LAW, np.arange(count)[:, None] == count - 1
 
     def column(field: str) -> Floats:
-        return np.array([np.array(getattr(kind, field))[group] for kind in _KINDS])
+        return np.array([np.array(getattr(kind, field))[group] for kind in kinds])
 
     return Shapes(
         names * count,
