@@ -45,13 +45,13 @@ def _paris(half: float) -> _Form:
 
 _SEED = 0.15  # of the span, where a new unit has no damage
 _FAMILIES: Mapping[str, tuple[float, tuple[_Form, ...]]] = {
-    "linear": (0.0175, (lambda s, _seed: s,)),
-    "power": (0.025, tuple(_power(b) for b in (0.5, 0.6, 0.75, 1.4, 1.8, 2.4))),
-    "exponential": (0.025, tuple(_exponential(a) for a in (-2.0, -1.2, 1.5, 2.5, 4.0))),
-    "paris": (0.02, tuple(_paris(m) for m in (1.25, 1.5, 1.75, 2.0))),
-    NO_LAW: (0.02, (lambda s, _seed: s,)),
+    "linear": (0.012, (lambda s, _seed: s,)),
+    "power": (0.018, tuple(_power(b) for b in (0.5, 0.6, 0.75, 1.4, 1.8, 2.4))),
+    "exponential": (0.018, tuple(_exponential(a) for a in (-2.0, -1.2, 1.5, 2.5, 4.0))),
+    "paris": (0.014, tuple(_paris(m) for m in (1.25, 1.5, 1.75, 2.0))),
+    NO_LAW: (0.014, (lambda s, _seed: s,)),
 }
-_OWN, _BENT, _FREE = range(3)  # groups of rows: columns of a `_Kind`
+_NAMED, _HASTENED, _FREE = range(3)  # groups of rows: columns of a `_Kind`
 _LONGEST_LIFE = 1e6
 """Repetitions of a life by growth of no physics, at most: a law that says nothing grows (a winding
 that stays cold) does not hold it back. ASSUMED: more than any unit is used for."""
@@ -80,9 +80,9 @@ class _Kind:
 
 
 _KINDS = (
-    _Kind((0.69, 0, 0.72), (0.18, 0, 0.15), (0, 0, 5e-4), (0.03, 0, 0.3), (0.005, 0, 0.3)),
-    _Kind((0, 0.28, 0.28), (0, 0.4, 0.4), (0, 0, 1e-4), (0, 0.03, 0.4), (0, 0.03, 0.4)),
-    _Kind((0.03, 0, 0), (0.5, 0, 0.5), (0.01, 0, 0.01), (0.5, 0, 0.5), (0.5, 0, 0.5)),
+    _Kind((0.78, 0, 0.72), (0.18, 0, 0.15), (0, 0, 5e-4), (0.03, 0, 0.3), (0.005, 0, 0.3)),
+    _Kind((0, 0.2, 0.28), (0, 0.4, 0.4), (0, 0, 1e-4), (0, 0.03, 0.4), (0, 0.03, 0.4)),
+    _Kind((0.02, 0, 0), (0.5, 0, 0.5), (0.01, 0, 0.01), (0.5, 0, 0.5), (0.5, 0, 0.5)),
 )
 #: Where a mission keeps its law alone, it is taken at its word.
 _ALONE = (
@@ -169,7 +169,7 @@ def shapes_of(law: Law, rate: Callable[[Floats, int], Floats], limit: float) -> 
     member_clocks, members_prior = _members(law, damage, rate)
     life = np.diff(np.interp((start, limit), level, member_clocks[0]))[0]
     names, prior, clocks = [law.name] * len(member_clocks), list(members_prior), list(member_clocks)
-    group = [_OWN] * len(names)
+    group = [_NAMED] * len(names)
     if not law.only:
         relative = np.maximum((level - start) / (limit - start), 0.0)
         below = level < start
@@ -178,9 +178,9 @@ def shapes_of(law: Law, rate: Callable[[Floats, int], Floats], limit: float) -> 
         life = min(life, _LONGEST_LIFE)
         clocks += [_hastened(member_clocks[0], relative, folds) for folds, _ in _WRONG]
         names += [f"{law.name}, hastened"] * len(_WRONG)
-        rest = 1.0 - sum(share for share, _ in _FAMILIES.values())
-        prior = [rest * share for share in (*prior, *(share for _, share in _WRONG))]
-        group += [_BENT] * len(_WRONG)
+        named_share = 1.0 - sum(share for share, _ in _FAMILIES.values())
+        prior = [named_share * share for share in (*prior, *(share for _, share in _WRONG))]
+        group += [_HASTENED] * len(_WRONG)
         for name, (share, forms) in _FAMILIES.items():
             for form in forms:
                 use = first + life * form(relative, seed)
