@@ -42,8 +42,8 @@ class Detector:
     ) -> None:
         size = np.linalg.norm(directions, axis=1)
         seen = size > 1e-9
-        self._ways = directions[seen] / size[seen, None]
-        self._both = np.array(both)[seen]
+        ways, either = directions[seen] / size[seen, None], np.array(both, dtype=np.bool_)[seen]
+        self._ways, self._either = np.vstack([ways[either], ways[~either]]), int(either.sum())
         self._degrees, self._anywhere = degrees, anywhere
         healthy = _student(directions.shape[1], degrees) if draws is None else draws
         ratios = self.ratio(healthy)
@@ -55,9 +55,10 @@ class Detector:
         if not len(self._ways):
             return np.zeros(len(residual))
         along = residual @ self._ways.T
-        along = np.where(self._both, np.abs(along), np.maximum(along, 0.0))
-        square = np.sum(residual**2, axis=1)
-        gain = np.maximum(square - along.max(axis=1) ** 2, 0.0)
+        np.abs(along[:, : self._either], out=along[:, : self._either])
+        most = np.maximum(along.max(axis=1), 0.0)
+        square = np.einsum("mk,mk->m", residual, residual)
+        gain = np.maximum(square - most**2, 0.0)
         power = 0.5 * (self._degrees + residual.shape[1])
         return np.asarray(
             power * (np.log1p(square / self._degrees) - np.log1p(gain / self._degrees))

@@ -83,8 +83,10 @@ class Replay:
 
 def _read(at: Floats, table: Floats, severity: Floats) -> Floats:
     """Straight lines between the rows of a table; the ends beyond them."""
-    low = np.clip(np.searchsorted(at, severity, side="right") - 1, 0, len(at) - 2)
-    part = np.clip((severity - at[low]) / (at[low + 1] - at[low]), 0.0, 1.0)[:, None]
+    below = np.searchsorted(at, severity, side="right") - 1
+    low = np.minimum(np.maximum(below, 0), len(at) - 2)
+    part = (severity - at[low]) / (at[low + 1] - at[low])
+    part = np.minimum(np.maximum(part, 0.0), 1.0)[:, None]
     return np.asarray(table[low] * (1.0 - part) + table[low + 1] * part, dtype=np.float64)
 
 
