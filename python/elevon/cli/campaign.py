@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -14,6 +15,9 @@ from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 from elevon.plain import fields_of
+
+if TYPE_CHECKING:
+    from elevon.campaign.execute import CampaignResult
 
 app = group("Run plans of many labelled simulations.")
 campaign_analysis.add_to(app)
@@ -96,17 +100,8 @@ def run(
 
     read, document = load_plan(plan)
     resolved = resolve_plan(read, document, allow_outside=allow_outside)
-    with interrupt.telling(lambda: _how_far(out)), progress_bar(f"running {read.name}") as advance:
-        result = run_campaign(
-            resolved,
-            document.text,
-            out,
-            threads=threads,
-            cluster=_cluster(scheduler, cluster),
-            progress=advance,
-            announce=say,
-        )
-    return _reported(result, out)
+    work = partial(run_campaign, resolved, document.text, out)
+    return _carried_out(work, out, f"running {read.name}", threads, _cluster(scheduler, cluster))
 
 
 @command(app)
@@ -120,15 +115,8 @@ def resume(
     """Go on with a campaign from its folder; the plan file is not needed."""
     from elevon.campaign import resume_campaign
 
-    with interrupt.telling(lambda: _how_far(folder)), progress_bar("going on") as advance:
-        result = resume_campaign(
-            folder,
-            threads=threads,
-            cluster=_cluster(scheduler, cluster),
-            progress=advance,
-            announce=say,
-        )
-    return _reported(result, folder)
+    work = partial(resume_campaign, folder)
+    return _carried_out(work, folder, "going on", threads, _cluster(scheduler, cluster))
 
 
 @command(app)
@@ -189,7 +177,15 @@ def _how_far(out: Path) -> str:
     )
 
 
-def _reported(result: Any, out: Path) -> Answer:
+def _carried_out(
+    work: Callable[..., CampaignResult],
+    out: Path,
+    title: str,
+    threads: int | None,
+    cluster: str | None,
+) -> Answer:
+    with interrupt.telling(lambda: _how_far(out)), progress_bar(title) as advance:
+        result = work(threads=threads, cluster=cluster, progress=advance, announce=say)
     code = 1 if result.failed else 0
     return Answer(_summary(result, out), lambda: _print(result, out), code)
 

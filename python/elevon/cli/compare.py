@@ -70,21 +70,16 @@ def compare(
 def _print(headline: str, values: dict[str, Any]) -> None:
     answer(headline)
     runs = values["loads"] or {"": values}
+    lines = (
+        ("output position", "position_nrmse", ".3%", "of the amplitude"),
+        ("motor speed", "speed_nrmse", ".3%", "of its RMS"),
+        ("torque current", "q_current_nrmse", ".3%", "of its RMS"),
+        ("reduced-order model", "low_realtime_factor", ".0f", "times real time"),
+        ("speed-up", "speed_up", ".0f", "times the switching model"),
+    )
     rows = [
-        [
-            "output position",
-            *(f"{100 * r['position_nrmse']:.3f} % of the amplitude" for r in runs.values()),
-        ],
-        ["motor speed", *(f"{100 * r['speed_nrmse']:.3f} % of its RMS" for r in runs.values())],
-        [
-            "torque current",
-            *(f"{100 * r['q_current_nrmse']:.3f} % of its RMS" for r in runs.values()),
-        ],
-        [
-            "reduced-order model",
-            *(f"{r['low_realtime_factor']:.0f} times real time" for r in runs.values()),
-        ],
-        ["speed-up", *(f"{r['speed_up']:.0f} times the switching model" for r in runs.values())],
+        [name, *(f"{run[key]:{form}} {what}".replace("%", " %") for run in runs.values())]
+        for name, key, form, what in lines
     ]
     print_table(["RMS of low less high", *runs], rows)
     answer(f"after {values['start_s']:g} s; {values['filter']}")

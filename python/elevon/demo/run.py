@@ -20,7 +20,7 @@ from elevon.logs.importing import ImportedLog, import_log, same_rate
 from elevon.logs.log import Log
 from elevon.parameters.relations import motor_torque_constant
 from elevon.progress import Progress, part
-from elevon.report.checks import Check, verdict
+from elevon.report.checks import Check
 
 _PAGES = ("report.html", "backlash.html", "calibrated.toml", "truth.json")
 
@@ -90,15 +90,7 @@ class Demo(Story):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
-        checks = self.checks
-        return {
-            **verdict(checks),
-            "seed": self.seed,
-            "rows": self.rows(),
-            "steps": [step.to_dict() for step in self.steps],
-            "wall_s": self.seconds,
-            "report": str(self.folder / "report.html"),
-        }
+        return self.summary(self.checks) | {"rows": self.rows()}
 
 
 def encoder_count(actuator: Actuator) -> float:

@@ -6,12 +6,13 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from elevon.actuator import Actuator
 from elevon.demo.finished import FinishedSteps
 from elevon.demo.results import Step
 from elevon.plain import plain
+from elevon.report.checks import Check, verdict
 
 Result = TypeVar("Result")
 
@@ -101,3 +102,13 @@ class Story:
     def seconds(self) -> float:
         """Time of all steps so far."""
         return sum(step.seconds for step in self.steps)
+
+    def summary(self, checks: Sequence[Check]) -> dict[str, Any]:
+        """Return what every demonstration's JSON form has."""
+        return {
+            **verdict(checks),
+            "seed": self.seed,
+            "steps": [step.to_dict() for step in self.steps],
+            "wall_s": self.seconds,
+            "report": str(self.folder / "report.html"),
+        }

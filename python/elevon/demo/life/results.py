@@ -14,7 +14,7 @@ from elevon.diagnose.engine.answer import Diagnosis
 from elevon.prognose import Inspection, Prognosis, ResponseTables
 from elevon.prognose.life import Life
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
-from elevon.report.checks import Check, verdict
+from elevon.report.checks import Check
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,7 @@ class LifeDemo(Story):
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
         return {
-            **verdict(self.checks),
-            "seed": self.seed,
+            **self.summary(self.checks),
             "end": self.life.end,
             "cumulative_relative_accuracy": self.accuracy,
             "inside": self.inside,
@@ -151,7 +150,4 @@ class LifeDemo(Story):
                 }
                 for v in self.visits
             ],
-            "steps": [step.to_dict() for step in self.steps],
-            "wall_s": self.seconds,
-            "report": str(self.folder / "report.html"),
         }
