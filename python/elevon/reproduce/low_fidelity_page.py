@@ -5,7 +5,7 @@ from __future__ import annotations
 from elevon.report import Report, ReportTable
 from elevon.reproduce.compare_page import draw_comparison
 from elevon.reproduce.low_fidelity import LowFidelityResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 
 def low_fidelity_page(result: LowFidelityResult, seed: int, *, date: str | None = None) -> Report:
@@ -24,7 +24,4 @@ def low_fidelity_page(result: LowFidelityResult, seed: int, *, date: str | None 
     report.section("Differences").table(ReportTable(columns, rows, caption, digits=3))
     for row, comparison in zip(result.rows, result.comparisons, strict=True):
         draw_comparison(report.section(row.name[0].upper() + row.name[1:]), comparison)
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce low-fidelity --seed {seed} --out DIR"
-    report.provenance(provenance(command, Seed=seed))
-    return report
+    return closed(report, result.checks, f"low-fidelity --seed {seed}", Seed=seed)

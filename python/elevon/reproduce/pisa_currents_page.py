@@ -11,7 +11,7 @@ from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_currents import WINDOW, CommutationResult, electrical
 from elevon.reproduce.pisa_gear import ACTUATOR
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,9 +48,7 @@ def commutation_report(result: CommutationResult, *, date: str | None = None) ->
         f"Phase currents of the nominal extension; {len(result.pulses)} stretches of shorted "
         "windings, the longest in the lower panel.",
     )
-    report.section("Checks").checks(result.checks)
-    report.provenance(provenance("elevon reproduce pisa-commutation --out DIR"))
-    return report
+    return closed(report, result.checks, "pisa-commutation")
 
 
 def _commutation(result: CommutationResult) -> Figure:

@@ -10,7 +10,7 @@ import numpy as np
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_friction import FrictionResult, FrictionRow, FrictionTrace
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,9 +53,7 @@ def friction_report(result: FrictionResult, *, date: str | None = None) -> Repor
     section = report.section("All quantities")
     title = f"{len(result.rows)} quantities, put in and recovered"
     section.table(ReportTable(_COLUMNS, _cells(result.rows), digits=4, folded=title))
-    report.section("Checks").checks(result.checks)
-    report.provenance(provenance("elevon reproduce pisa-friction --out DIR", Seed=result.seed))
-    return report
+    return closed(report, result.checks, "pisa-friction", Seed=result.seed)
 
 
 def _cells(rows: Iterable[FrictionRow]) -> list[list[object]]:

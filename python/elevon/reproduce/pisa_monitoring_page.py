@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from elevon.report import Report, ReportTable
 from elevon.reproduce.pisa_monitoring import TARGET, MonitoringResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 
 def monitoring_report(result: MonitoringResult, *, date: str | None = None) -> Report:
@@ -27,6 +27,4 @@ def monitoring_report(result: MonitoringResult, *, date: str | None = None) -> R
             formats=["", ".0f", ".4f", ".1f", ".3f", ".3f", ".3f"],
         )
     )  # fmt: skip
-    report.section("Checks").checks(result.checks)
-    report.provenance(provenance("elevon reproduce pisa-monitoring --out DIR"))
-    return report
+    return closed(report, result.checks, "pisa-monitoring")

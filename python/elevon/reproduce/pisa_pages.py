@@ -11,7 +11,7 @@ from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_functional import FunctionalResult, FunctionalRow
 from elevon.reproduce.pisa_gear import COMMANDED
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,11 +73,7 @@ def functional_report(result: FunctionalResult, *, date: str | None = None) -> R
             _stroke_figure(row), f"Position, speeds, current and state over the stroke, {title}."
         )
         part.figure(_load_figure(row), f"Load on the ram over the stroke, {title}.")
-    report.section("Checks").checks(result.checks)
-    report.provenance(
-        provenance("elevon reproduce pisa-functional --out DIR", **_run_facts(result))
-    )
-    return report
+    return closed(report, result.checks, "pisa-functional", **_run_facts(result))
 
 
 def _speeds(row: FunctionalRow, stroke: str) -> str:
@@ -164,9 +160,7 @@ def hydraulic_report(result: HydraulicResult, *, date: str | None = None) -> Rep
     section.table(
         ReportTable(columns, rows, "Extension aids the load, retraction lifts it.", formats=formats)
     )
-    report.section("Checks").checks(result.checks)
-    report.provenance(provenance("elevon reproduce pisa-hydraulic --out DIR"))
-    return report
+    return closed(report, result.checks, "pisa-hydraulic")
 
 
 def _hydraulic_figure(result: HydraulicResult) -> Figure:

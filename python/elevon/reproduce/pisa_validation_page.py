@@ -5,7 +5,7 @@ from __future__ import annotations
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.pisa_validation import DISPLAYED, MEAN, StrokeSignalRow, ValidationResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 from elevon.units import display_unit, to_display
 
 _AXES = {
@@ -51,10 +51,9 @@ def validation_page(result: ValidationResult, *, date: str | None = None) -> Rep
                 axis.set_ylabel(label)
             axes[-1].set_xlabel("Time [s]")
         section.figure(figure, "Virtual rig (grey) and model (orange).")
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce pisa-validation --seed {result.seed} --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(
+        report, result.checks, f"pisa-validation --seed {result.seed}", result.parameter_hash
+    )
 
 
 def _row(row: StrokeSignalRow) -> list[object]:

@@ -14,7 +14,7 @@ from elevon.reproduce.compliance.campaign import (
     STANDARD_GRAVITY_FACTOR,
     ComplianceResult,
 )
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,11 +40,7 @@ def compliance_report(
     _data(report, result)
     _estimators(report, result)
     _answer(report, result)
-    report.section("Checks").checks(result.checks)
-    report.provenance(
-        provenance("elevon reproduce torino-compliance --out DIR", **{"Bootstrap seed": seed})
-    )
-    return report
+    return closed(report, result.checks, "torino-compliance", **{"Bootstrap seed": seed})
 
 
 def _data(report: Report, result: ComplianceResult) -> None:

@@ -10,7 +10,7 @@ from elevon.logs.formats.cranfield import DATA_DOI, PAPER_DOI
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.cranfield.result import GROUPED, STRICT, CranfieldResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,11 +35,8 @@ def cranfield_report(result: CranfieldResult, *, seed: int = 0, date: str | None
     _detection(report, result)
     _sessions(report, result)
     _contents(report, result)
-    report.section("Checks").checks(result.checks)
     sources = {"Data": f"doi {DATA_DOI}", "Paper": f"doi {PAPER_DOI}", "Seed": seed}
-    command = f"elevon reproduce cranfield --data FOLDER --seed {seed} --out DIR"
-    report.provenance(provenance(command, **sources))
-    return report
+    return closed(report, result.checks, f"cranfield --data FOLDER --seed {seed}", **sources)
 
 
 def _sentence(result: CranfieldResult) -> str:

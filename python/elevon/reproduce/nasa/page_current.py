@@ -5,7 +5,7 @@ from __future__ import annotations
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.current import PUBLISHED, CurrentResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 
 def current_report(result: CurrentResult, *, date: str | None = None) -> Report:
@@ -71,7 +71,6 @@ def current_report(result: CurrentResult, *, date: str | None = None) -> Report:
             axes.set(xlabel="Time [s]", ylabel="Current [A]")
             axes.legend(loc="upper right", ncols=2)
         part.figure(figure, "Torque current of the virtual stand and of the model.")
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce nasa-current --seed {result.seed} --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(
+        report, result.checks, f"nasa-current --seed {result.seed}", result.parameter_hash
+    )

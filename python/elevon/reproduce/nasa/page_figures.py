@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.figures import LEVELS, SPEEDS, ZOOM, FaultFigure, FaultFiguresResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,10 +45,7 @@ def faults_report(result: FaultFiguresResult, *, date: str | None = None) -> Rep
             formats=[".4g", ".0f", ".0f", ".3f", ".3f"],
         )
     )  # fmt: skip
-    report.section("Checks").checks(result.checks)
-    command = "elevon reproduce nasa-faults --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(report, result.checks, "nasa-faults", result.parameter_hash)
 
 
 def _panels(item: FaultFigure) -> Figure:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.nasa.flight import FAULT, SWITCH, FlightResult
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,9 +43,7 @@ def flight_report(result: FlightResult, *, date: str | None = None) -> Report:
             formats=["", ".0f", ".0f", ".3f", ".3f", ".4f"],
         )
     )  # fmt: skip
-    report.section("Checks").checks(result.checks)
-    report.provenance(provenance("elevon reproduce nasa-flight --out DIR"))
-    return report
+    return closed(report, result.checks, "nasa-flight")
 
 
 def _figure(result: FlightResult) -> Figure:

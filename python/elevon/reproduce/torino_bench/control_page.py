@@ -6,7 +6,7 @@ import numpy as np
 
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 from elevon.reproduce.torino_bench.control import GAINS, ControlResult
 
 
@@ -32,7 +32,4 @@ def control_page(result: ControlResult, seed: int, *, date: str | None = None) -
     caption = "Behind 1:124 the bench's drive, limited to 500 rpm, turns no faster."
     columns = ["No-load speed of", "Required [deg/s]", "Model [deg/s]", "Met"]
     report.section("No-load speed").table(ReportTable(columns, rows, caption, digits=4))
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce torino-control --seed {seed} --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(report, result.checks, f"torino-control --seed {seed}", result.parameter_hash)

@@ -8,7 +8,7 @@ from elevon.bench.spring import STANDARD_WIRES, SpringTask, design_spring
 from elevon.report import Report, ReportTable
 from elevon.report.document import Section
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 from elevon.reproduce.torino_bench.drops import DAMPING, MASSES, DropsResult, DropTrace
 
 
@@ -28,10 +28,9 @@ def drops_page(result: DropsResult, *, date: str | None = None) -> Report:
     section = report.section("Series block against the bench")
     _drop(section, result.traces[-1], "Heaviest weight (Figures 6.1, 6.2)", rigid=True)
     _springs(report)
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce torino-drops --seed {result.seed} --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(
+        report, result.checks, f"torino-drops --seed {result.seed}", result.parameter_hash
+    )
 
 
 def _estimates(report: Report, result: DropsResult) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from elevon.report import Report, ReportTable
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 from elevon.reproduce.torino_bench.fmeca import ALIKE, NAMED, FmecaResult
 
 
@@ -27,7 +27,6 @@ def fmeca_page(result: FmecaResult, *, date: str | None = None) -> Report:
         "Rates as printed, of a component; change: of a channel's RMS against the healthy log."
     )
     report.section("Failure modes").table(ReportTable(columns, rows, caption, digits=3))
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce torino-fmeca --seed {result.seed} --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(
+        report, result.checks, f"torino-fmeca --seed {result.seed}", result.parameter_hash
+    )

@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.report import Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.provenance import provenance
+from elevon.reproduce.provenance import closed
 from elevon.reproduce.torino_bench.validation import (
     START,
     TorinoValidation,
@@ -40,10 +40,9 @@ def torino_validation_page(result: TorinoValidation, *, date: str | None = None)
     _positions(report, result.curves)
     _errors(report, result.curves)
     _speeds(report, result.curves)
-    report.section("Checks").checks(result.checks)
-    command = f"elevon reproduce torino-validation --seed {result.seed} --out DIR"
-    report.provenance(provenance(command, **{"Parameter hash": result.parameter_hash}))
-    return report
+    return closed(
+        report, result.checks, f"torino-validation --seed {result.seed}", result.parameter_hash
+    )
 
 
 def _tables(report: Report, result: TorinoValidation) -> None:
