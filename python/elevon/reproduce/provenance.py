@@ -30,7 +30,7 @@ def _version(package: object) -> str:
 
 
 def closed(
-    report: Report, checks: Sequence[Check], words: str, values: str = "", **more: object
+    report: Report, checks: Sequence[Check], words: str, values: str = "", /, **more: object
 ) -> Report:
     """Return a case's report with its checks and what made it.
 
