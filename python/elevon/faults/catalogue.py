@@ -90,27 +90,13 @@ def catalogue(wiring: str) -> tuple[FaultRecord, ...]:
     """Return the core's catalogue; a kind that acts on places of two units has two records."""
     from elevon import _core
 
-    return tuple(
-        FaultRecord(
-            kind=item["kind"],
-            places=tuple(item["places"]),
-            unit=item["unit"],
-            minimum=float(item["minimum"]),
-            maximum=float(item["maximum"]),
-            minimum_open=bool(item["minimum_open"]),
-            effect=item["effect"],
-            source=item["source"],
-            rate=float(item["rate"]),
-            rate_source=item["rate_source"],
-            attributes=tuple(item["attributes"]),
-            fidelities=tuple(item["fidelities"]),
-            not_modelled=item["not_modelled"],
-            targets={place: tuple(paths) for place, paths in item["targets"].items()},
-            whole=bool(item["whole"]),
-            switched=bool(item["switched"]),
-        )
-        for item in _core.faults(wiring)
-    )
+    return tuple(_record(item) for item in _core.faults(wiring))
+
+
+def _record(item: Mapping[str, Any]) -> FaultRecord:
+    lists = {name: tuple(item[name]) for name in ("places", "attributes", "fidelities")}
+    targets = {place: tuple(paths) for place, paths in item["targets"].items()}
+    return FaultRecord(**{**item, **lists, "targets": targets})
 
 
 def find_record(kind: str, place: str, wiring: str, where: str = "") -> FaultRecord:
