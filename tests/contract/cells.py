@@ -102,7 +102,9 @@ class Cell:
         data["parameters"] = {path: value for path, value in initial.items() if path not in given}
         if self.load:
             data["load"] = {"output": {"terms": [{"kind": "constant", "value": self.load}]}}
-            data["initial"] = {**self._pressed(), **data.get("initial", {})}
+            # A gear of several bodies starts amid its backlashes.
+            pressed = {} if "gear.model" in given else self._pressed()
+            data["initial"] = {**pressed, **data.get("initial", {})}
         if duration is not None:
             data["duration"] = duration
         return elevon.Scenario.from_dict({**data, "fault": list(faults)})

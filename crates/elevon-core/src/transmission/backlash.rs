@@ -12,7 +12,7 @@ variables! {
     /// Backlash between motor and output, measured at the output.
     BacklashParameter, BACKLASH {
         Total => "total", "2 BLK", "rad", NonNegative, Plant, None, "total backlash, twice the half amplitude BLK of the papers";
-        Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; backlash added by wear";
+        Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; backlash added by wear, at the output";
         Model => "model", "-", "1", Choice(BacklashModel::NAMES), Plant, Some(0.0), "the backlash operator, rigid flanks where a force or friction acts on the output; or two masses with an elastic, damped dead zone",
             high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model");
         Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the output (elastic model)",
@@ -25,8 +25,8 @@ variables! {
 #[derive(Clone, Copy, Debug)]
 pub struct Backlash<S> {
     pub half: S,
-    stiffness: S,
-    damping: S,
+    pub stiffness: S,
+    pub damping: S,
 }
 
 impl<S: Scalar> Backlash<S> {
@@ -34,6 +34,10 @@ impl<S: Scalar> Backlash<S> {
         use BacklashParameter as P;
         let g = |p: P| raw[p as usize];
         Self { half: S::splat(0.5) * (g(P::Total) + g(P::Extra)), stiffness: g(P::Stiffness), damping: g(P::Damping) }
+    }
+
+    pub fn of(half: S, stiffness: S, damping: S) -> Self {
+        Self { half, stiffness, damping }
     }
 
     /// Output position, carried along by `driver` through the backlash (T1 eq. 3).

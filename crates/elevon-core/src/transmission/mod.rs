@@ -6,6 +6,7 @@ pub mod brake;
 pub mod friction;
 pub mod friction_law;
 pub mod gear;
+pub mod gear_train;
 pub mod lever;
 pub mod lock;
 pub mod lubricant;

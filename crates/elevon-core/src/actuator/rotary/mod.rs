@@ -1,10 +1,14 @@
 //! The rotary actuator (Torino): a geared servo whose output turns.
 
+mod records;
+
 use super::servo::{faults, layout, signals, Form};
 use super::{Finding, Machine, Port, Setup};
 use crate::fault::FaultKind;
 use crate::scalar::Scalar;
+use crate::transmission::backlash::BacklashParameter;
 use crate::transmission::gear::GearParameter;
+use crate::transmission::gear_train::{GearLayout, GearTrain};
 use crate::transmission::nut_heat::NutHeat;
 use crate::transmission::screw::Screw;
 use crate::transmission::vibration::Vibration;
@@ -15,7 +19,7 @@ use layout::At;
 pub struct Rotary;
 
 impl Machine for Rotary {
-    const GROUPS: &'static [Group] = layout::GROUPS;
+    const GROUPS: &'static [Group] = records::GROUPS;
     const PORTS: &'static [Port] = layout::PORTS;
     const LATE_PORTS: &'static [usize] = &[layout::OUTPUT];
     const HELD_PORTS: &'static [usize] = &[layout::AMBIENT];
@@ -27,11 +31,17 @@ impl Machine for Rotary {
 
 impl Form for Rotary {
     const LINEAR: bool = false;
-    const HIGH: &'static [Signal] = signals::HIGH;
+    const HIGH: &'static [Signal] = records::HIGH;
     const LOW: &'static [Signal] = signals::LOW;
 
     fn ratio<S: Scalar>(raw: &[S]) -> S {
         raw[GearParameter::Ratio.at()]
+    }
+    fn layout(raw: &[f64]) -> GearLayout {
+        GearLayout::read(records::train(raw))
+    }
+    fn train<S: Scalar>(raw: &[S], layout: GearLayout) -> GearTrain<S> {
+        GearTrain::derive(records::train(raw), layout, Self::ratio(raw), raw[BacklashParameter::Extra.at()])
     }
     fn screw_inertia<S: Scalar>(_raw: &[S]) -> S {
         S::zero()
@@ -57,8 +67,8 @@ impl Form for Rotary {
     fn contaminated(_setup: &Setup) -> bool {
         false
     }
-    fn check(_raw: &[f64]) -> Vec<Finding> {
-        Vec::new()
+    fn check(raw: &[f64]) -> Vec<Finding> {
+        records::check(raw)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::form::Form;
 use super::layout::*;
+use super::shaft;
 use crate::actuator::Finding;
 use crate::control::current_dq::{largest_gain, PwmParameter};
 use crate::control::derivative::{Carrier, Relays, SpeedLoop};
@@ -13,9 +14,10 @@ use crate::motor::thermal::{ThermalModel, ThermalParameter as Thermal};
 use crate::motor::unbalance::UnbalanceParameter;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::resolver::ResolverParameter as Resolver;
-use crate::transmission::backlash::{BacklashModel, BacklashParameter};
+use crate::transmission::backlash::BacklashParameter;
 use crate::transmission::friction::FrictionParameter;
 use crate::transmission::gear::{GearParameter, LoadParameter, StopParameter};
+use crate::transmission::gear_train::GearTrain;
 
 pub fn finding(path: &str, value: f64, limit: f64, message: String) -> Finding {
     Finding::error(path, value, limit, message)
@@ -260,7 +262,7 @@ fn inertia<F: Form>(raw: &[f64]) -> (f64, f64) {
         + raw[GearParameter::Inertia.at()]
         + F::screw_inertia(raw)
         + raw[UnbalanceParameter::UnbalanceInertia.at()];
-    let elastic = BacklashModel::read(raw[BacklashParameter::Model.at()]) == BacklashModel::Elastic;
+    let elastic = shaft::elastic::<F>(raw);
     let ratio = F::ratio(raw);
     let output = raw[LoadParameter::Inertia.at()] / (ratio * ratio);
     (rotor, if elastic { rotor } else { rotor + output })
@@ -279,7 +281,10 @@ fn steps<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     if viscous > 0.0 {
         step_limit(out, dt, inertia / viscous, "viscous pole C / J of friction.viscous");
     }
-    if BacklashModel::read(raw[BacklashParameter::Model.at()]) == BacklashModel::Elastic {
+    let layout = F::layout(raw);
+    if layout.bodies() {
+        meshes(out, raw, &F::train(raw, layout), [rotor, raw[LoadParameter::Inertia.at()]]);
+    } else if shaft::elastic::<F>(raw) {
         let ratio = F::ratio(raw);
         contact::<F>(out, raw, dt, rotor * ratio * ratio, raw[LoadParameter::Inertia.at()]);
     }
@@ -341,6 +346,20 @@ fn contact<F: Form>(out: &mut Vec<Finding>, raw: &[f64], dt: f64, motor: f64, ou
     step_limit(out, dt, limit.min(damped), "contact stiffness backlash.stiffness and damping backlash.damping");
 }
 
+/// Bodies on the stiffness of their meshes, as two masses on a contact.
+fn meshes(out: &mut Vec<Finding>, raw: &[f64], train: &GearTrain<f64>, [motor, output]: [f64; 2]) {
+    if output <= 0.0 {
+        let message = "load.inertia: a gear of several bodies (gear.model) needs a mass at the output, above 0 kg m2".into();
+        out.push(finding("load.inertia", output, 0.0, message));
+        return;
+    }
+    let [square, damping, ratio] = train.fastest(motor, output);
+    let semi = Method::read(raw[SolverParameter::Method.at()]) == Method::SemiImplicit;
+    let limit = if semi { 1.0 / square.sqrt() } else { ratio };
+    let pole = "meshes of the gear: gear.mesh_stiffness_1 to 3, gear.mesh_damping_1 to 3 on gear.inertia_1 and 2";
+    step_limit(out, raw[SolverParameter::Step.at()], limit.min(1.0 / damping), pole);
+}
+
 pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
     let mut out = Vec::new();
     common::<F>(&mut out, raw);
@@ -349,7 +368,8 @@ pub fn low<F: Form>(raw: &[f64]) -> Vec<Finding> {
         + raw[GearParameter::Inertia.at()]
         + F::screw_inertia(raw)
         + raw[UnbalanceParameter::UnbalanceInertia.at()]
-        + raw[LoadParameter::Inertia.at()] / (ratio * ratio);
+        + raw[LoadParameter::Inertia.at()] / (ratio * ratio)
+        + F::train(raw, F::layout(raw)).reflected;
     derivative_inertia(&mut out, raw, inertia, raw[SolverParameter::Step.at()], false);
     let dt = raw[LowParameter::Step.at()];
     let gain = raw[Control::SpeedGain.at()] * raw[Control::SpeedGainScale.at()];

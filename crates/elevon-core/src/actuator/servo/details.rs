@@ -27,7 +27,7 @@ details! {
     always {
         drive: DriveKind = DriveKind::read(x.parts.drive().value(DriveParameter::Kind));
         control: ControlStructure = ControlStructure::read(&x.parts.control());
-        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::high(x.parts, x.records(F::HIGH, "energy")));
+        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::high::<F>(x.parts, x.records(F::HIGH, "energy")));
         sensing: SensingDetails = SensingDetails::read::<F>(x.parts);
         motor: MotorStructure = MotorStructure::read(&x.parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&x.parts.pole()));
         /// Which kinds of contacts in or at the windings.

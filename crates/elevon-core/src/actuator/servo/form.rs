@@ -2,6 +2,7 @@
 
 use crate::actuator::{Finding, Machine, Setup};
 use crate::scalar::Scalar;
+use crate::transmission::gear_train::{GearLayout, GearTrain};
 use crate::transmission::nut_heat::NutHeat;
 use crate::transmission::screw::Screw;
 use crate::transmission::vibration::Vibration;
@@ -20,6 +21,13 @@ pub trait Form: Machine {
 
     /// Motor angle over output coordinate.
     fn ratio<S: Scalar>(raw: &[S]) -> S;
+    /// Which bodies stand between motor and output.
+    fn layout(_raw: &[f64]) -> GearLayout {
+        GearLayout::Lumped
+    }
+    fn train<S: Scalar>(_raw: &[S], _layout: GearLayout) -> GearTrain<S> {
+        GearTrain::none()
+    }
     /// Inertia on the motor shaft besides the motor's and the gear's.
     fn screw_inertia<S: Scalar>(raw: &[S]) -> S;
     fn screw<S: Scalar>(raw: &[S]) -> Screw<S>;

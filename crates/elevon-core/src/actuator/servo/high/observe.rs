@@ -20,7 +20,7 @@ pub(crate) struct Observation<'a, S: Scalar> {
     pub inputs: &'a Inputs<S>,
     pub state: &'a State<S>,
     pub t: S,
-    /// With the signals of a screw.
+    /// With the signals of a screw, else with those of a gear of several bodies.
     pub linear: bool,
     pub out: &'a mut [S],
 }
@@ -38,6 +38,10 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
         energies(model, structure, state, out);
         if linear {
             screw(structure, model, &x, state, &signals, out);
+        } else {
+            let [first, second] = state.shaft.bodies.position;
+            let [sun, ring, output] = signals.meshes;
+            out[HIGH.len()..].copy_from_slice(&[first, second, sun, ring, output]);
         }
     }
 }

@@ -95,7 +95,7 @@ impl<F: Form> Wiring for Low<F> {
         state.keep(store);
     }
     fn refuses_start(raw: &[f64], initial: &[f64]) -> Option<String> {
-        crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]])
+        crate::actuator::servo::shaft::refuses_start::<F>(raw, [initial[0], initial[2]], false)
     }
     fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
         model.start(raw, initial)

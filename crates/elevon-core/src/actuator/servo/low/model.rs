@@ -41,7 +41,7 @@ details! {
         integral: bool = parts.control().used(if control.pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
         /// The command carries noise.
         noisy_command: bool = parts.control().used(ControlParameter::NoiseDeviation);
-        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low(parts));
+        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low::<F>(parts));
         sensing: SensingDetails = SensingDetails::read::<F>(parts);
         motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
     }

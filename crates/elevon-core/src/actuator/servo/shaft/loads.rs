@@ -3,6 +3,7 @@
 use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
+use crate::transmission::gear_train::MESHES;
 
 /// What acts on the motor shaft.
 #[derive(Clone, Copy)]
@@ -12,8 +13,12 @@ pub(in crate::actuator::servo) struct Loads<S> {
     /// Signed torque on the motor shaft, and the part of it that is not the contact of the elastic backlash.
     pub load: S,
     pub(super) motor_side: S,
-    /// Torque between gear and output, at the output.
+    /// Torque between gear and output, at the output: as the motor's side feels it, and as the output does. Only bodies
+    /// between take part of it.
     pub(super) through: S,
+    pub(super) delivered: S,
+    /// Torques of the meshes of a gear of several bodies.
+    pub(super) meshes: [S; MESHES],
     pub static_limit: S,
     pub dynamic: S,
     pub(super) viscous: S,
@@ -35,9 +40,15 @@ impl<S: Scalar> Shaft<S> {
     ) -> Loads<S> {
         let output_torque = self.output_torque(d, x, s);
         let elastic = FULL && d.elastic;
-        let mut through = if elastic { self.contact(d, s) } else { output_torque };
+        let meshed = EXTRA && d.meshed;
+        let mut through = if elastic && !meshed { self.contact(d, s) } else { output_torque };
         if FULL && d.flanks {
             through = S::select(self.joined(s), through, S::zero());
+        }
+        let (mut delivered, mut meshes) = (through, [S::zero(); MESHES]);
+        if meshed {
+            meshes = self.carried(d, s);
+            [through, delivered] = self.through_meshes(&meshes);
         }
         let mut load = through.fma(self.gear.per_ratio, x.shaft);
         let mut motor_side = if elastic { x.shaft } else { load };
@@ -51,7 +62,7 @@ impl<S: Scalar> Shaft<S> {
                 // Rigid: the load side's friction is felt on the motor shaft.
                 added = added + self.felt_friction(d, x, s) * self.gear.per_ratio;
             }
-            let (torque, friction, spalled) = self.disturbance(d, s, through);
+            let (torque, friction, spalled) = self.disturbance(d, s, [through, delivered]);
             load = load - torque;
             motor_side = motor_side - torque;
             added = added + friction;
@@ -109,7 +120,7 @@ impl<S: Scalar> Shaft<S> {
         let speed = s.motor_speed;
         let viscous = self.viscous::<FULL, EXTRA>(d, s);
         let resist = load + speed.signed(dynamic) + viscous;
-        Loads { brake, output_torque, load, motor_side, through, static_limit, dynamic, viscous, nut, resist }
+        Loads { brake, output_torque, load, motor_side, through, delivered, meshes, static_limit, dynamic, viscous, nut, resist }
     }
 
     #[inline(always)]
@@ -193,9 +204,10 @@ impl<S: Scalar> Shaft<S> {
     /// Torque of unbalance, spalls and drive train on the motor shaft, positive where it drives forwards, their
     /// friction, and that of the spalls alone.
     #[inline(always)]
-    pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, through: S) -> (S, S, S) {
+    pub(super) fn disturbance(&self, d: &ShaftDetails, s: &ShaftState<S>, carried: [S; 2]) -> (S, S, S) {
         let (mut torque, mut friction) = (S::zero(), S::zero());
         if d.spall {
+            let through = carried[0];
             (torque, friction) = self.screw.spall(s.motor_position, through, s.motor_position * self.gear.per_ratio);
         }
         let spalled = friction;
@@ -203,7 +215,7 @@ impl<S: Scalar> Shaft<S> {
             torque = torque + self.unbalance.torque(s.motor_position);
         }
         if d.train.extra {
-            let added = self.train.added(&d.train, s.motor_position, through, self.gear.per_ratio);
+            let added = self.train.added(&d.train, s.motor_position, carried, self.gear.per_ratio);
             torque = torque + added.torque();
             friction = friction + added.friction();
         }

@@ -2,12 +2,14 @@
 //! loads, the friction (dry, viscous, of a preloaded or worn screw, of the load side), unbalance, seizure, stops and backlash,
 //! and it keeps the accounts of their work.
 
+mod bodies;
 mod flank;
 mod loads;
 mod observe;
 mod step;
 mod train;
 
+use self::bodies::Bodies;
 use self::flank::Flank;
 pub(super) use self::loads::Loads;
 pub(super) use self::observe::ShaftSignals;
@@ -26,6 +28,7 @@ use crate::scalar::Scalar;
 use crate::transmission::backlash::{Backlash, BacklashModel, BacklashParameter};
 use crate::transmission::friction::Friction;
 use crate::transmission::gear::{Gear, GearParameter, LoadParameter};
+use crate::transmission::gear_train::{GearLayout, GearTrain};
 use crate::transmission::lubricant::{Grease, Lubricant};
 use crate::transmission::nut_heat::{NutHeat, NutState};
 use crate::transmission::screw::Screw;
@@ -47,6 +50,7 @@ details! {
             && !Teeth::<f64>::needed(&x.parts.tooth())
             && !Cogging::<f64>::needed(&x.parts.cogging());
         train: TrainDetails = TrainDetails::read::<F>(x.parts);
+        gear: GearLayout = x.gear;
     }
     full {
         elastic = x.elastic;
@@ -74,6 +78,8 @@ details! {
         lubricated = Grease::<f64>::needed(&x.parts.lubricant());
         nut = F::LINEAR && Network::<f64>::needed(&x.parts.thermal());
         vibrates = !x.low && F::vibrates(x.parts.0);
+        /// Bodies between motor and output move by themselves.
+        meshed = !x.low && gear.bodies();
     }
 }
 
@@ -84,24 +90,25 @@ pub(super) struct ShaftNeeds<'a> {
     pub elastic: bool,
     pub accounts: bool,
     pub low: bool,
+    pub gear: GearLayout,
 }
 
 impl<'a> ShaftNeeds<'a> {
     /// The second mass behind an elastic backlash, where the set has one.
-    pub(super) fn high(parts: Parts<'a>, accounts: bool) -> Self {
+    pub(super) fn high<F: Form>(parts: Parts<'a>, accounts: bool) -> Self {
         let semi_implicit = Method::read(parts.solver().value(SolverParameter::Method)) == Method::SemiImplicit;
-        let elastic = BacklashModel::read(parts.backlash().value(BacklashParameter::Model)) == BacklashModel::Elastic;
-        Self { parts, semi_implicit, elastic, accounts, low: false }
+        Self { parts, semi_implicit, elastic: elastic::<F>(parts.0.raw), accounts, low: false, gear: F::layout(parts.0.raw) }
     }
 
-    pub(super) fn low(parts: Parts<'a>) -> Self {
-        Self { parts, semi_implicit: true, elastic: false, accounts: false, low: true }
+    pub(super) fn low<F: Form>(parts: Parts<'a>) -> Self {
+        Self { parts, semi_implicit: true, elastic: false, accounts: false, low: true, gear: F::layout(parts.0.raw) }
     }
 
     /// Is there backlash, now or later?
     fn gapped(&self) -> bool {
         let backlash = self.parts.backlash();
-        backlash.most(BacklashParameter::Total) > 0.0
+        self.gear.bodies()
+            || backlash.most(BacklashParameter::Total) > 0.0
             || backlash.most(BacklashParameter::Extra) > 0.0
             || Teeth::<f64>::needed(&self.parts.tooth())
     }
@@ -115,6 +122,11 @@ impl<'a> ShaftNeeds<'a> {
     }
 }
 
+/// Has the output a speed of its own in the switching model, behind an elastic backlash or the meshes of a gear?
+pub(super) fn elastic<F: Form>(raw: &[f64]) -> bool {
+    F::layout(raw).bodies() || BacklashModel::read(raw[BacklashParameter::Model.at()]) == BacklashModel::Elastic
+}
+
 /// Constants of the shaft.
 #[derive(Clone, Copy, Debug)]
 pub struct Shaft<S> {
@@ -123,6 +135,7 @@ pub struct Shaft<S> {
     grease: Grease<S>,
     pub gear: Gear<S>,
     pub backlash: Backlash<S>,
+    gear_train: GearTrain<S>,
     pub screw: Screw<S>,
     /// Static over dynamic friction of the screw.
     stick: S,
@@ -164,12 +177,13 @@ pub struct ShaftState<S> {
     pub nut: NutState<S>,
     pub vibration: VibrationState<S>,
     flank: Flank<S>,
+    pub bodies: Bodies<S>,
     pub work: Work<S>,
 }
 
 kept!(ShaftState<f64> as ShaftState {
     motor_position, motor_speed, output_position, output_speed, jam_side, jammed, scatter, fastest, bristle, lubricant, nut, vibration,
-    flank, work
+    flank, bodies, work
 });
 
 /// Work done against each load since the start, J.
@@ -194,7 +208,15 @@ impl<S: Scalar> Shaft<S> {
         let reflected = output_inertia * gear.per_ratio * gear.per_ratio;
         let unbalance = Unbalance::derive(view.unbalance());
         let rotor = at(MotorParameter::Inertia.at()) + at(GearParameter::Inertia.at());
-        let rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
+        let mut rotor = rotor + F::screw_inertia(raw) + unbalance.inertia;
+        let gear_train = F::train(raw, d.gear);
+        let mut backlash = Backlash::derive(view.backlash());
+        if d.gear.bodies() {
+            backlash.half = S::splat(0.5) * gear_train.lost_motion;
+            if !d.meshed {
+                rotor = rotor + gear_train.reflected;
+            }
+        }
         let inertia = if d.elastic { rotor } else { rotor + reflected };
         let mut friction = Friction::derive(view.friction());
         friction.lubricated(screw.viscous);
@@ -203,7 +225,8 @@ impl<S: Scalar> Shaft<S> {
             friction,
             grease: Grease::derive(view.lubricant()),
             gear,
-            backlash: Backlash::derive(view.backlash()),
+            backlash,
+            gear_train,
             screw,
             train: Train::derive(raw, unbalance.eccentricity(rotor + reflected)),
             stick: Friction::stick(view.friction()),
@@ -244,6 +267,7 @@ impl<S: Scalar> Shaft<S> {
             nut: self.nut.start(),
             vibration: VibrationState::initial(),
             flank: Flank::at(driver - output_position, self.backlash.half),
+            bodies: Bodies::with(motor_position, or(motor[1], zero), self.gear_train.turns),
             work: Work { friction: zero, brake: zero, load: zero, impact: zero },
         }
     }
@@ -258,12 +282,23 @@ impl<S: Scalar> Shaft<S> {
 
 /// Why no shaft stands so: motor and output further apart than the backlash lets them. `at` holds both positions, NaN where not
 /// given.
-pub(super) fn refuses_start<F: Form>(raw: &[f64], at: [f64; 2]) -> Option<String> {
-    let ([motor, output], half) = (at, Backlash::derive(Raw(raw).backlash()).half);
+pub(super) fn refuses_start<F: Form>(raw: &[f64], at: [f64; 2], high: bool) -> Option<String> {
+    let [motor, output] = at;
     let driver = motor / F::ratio(raw);
+    let apart = (output - driver).abs();
+    let layout = F::layout(raw);
+    if high && layout.bodies() {
+        // How far each of several meshes is wound up two positions do not tell.
+        return (apart > 1e-9 * driver.abs() + 1e-12).then(|| {
+            format!(
+                "initial: output_position = {output} and motor_position = {motor}: the output is {apart} away from where a gear of several \
+                 bodies starts, amid each backlash; leave one of them out"
+            )
+        });
+    }
+    let half = if layout.bodies() { 0.5 * F::train(raw, layout).lost_motion } else { Backlash::derive(Raw(raw).backlash()).half };
     // What an elastic backlash is wound up by is for the caller to state.
     let elastic = BacklashModel::read(Raw(raw).backlash()[BacklashParameter::Model as usize]) == BacklashModel::Elastic;
-    let apart = (output - driver).abs();
     (!elastic && apart > half * (1.0 + 1e-9) + 1e-12).then(|| {
         format!(
             "initial: output_position = {output} and motor_position = {motor}: the output is {apart} away from where the motor holds it, more \

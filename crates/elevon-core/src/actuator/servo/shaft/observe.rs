@@ -6,6 +6,7 @@ use super::{Shaft, ShaftDetails, ShaftState};
 use crate::actuator::servo::advance::Instant;
 use crate::scalar::Scalar;
 use crate::transmission::friction::Friction;
+use crate::transmission::gear_train::MESHES;
 
 /// The shaft's signals for an observer.
 pub(in crate::actuator::servo) struct ShaftSignals<S> {
@@ -19,6 +20,8 @@ pub(in crate::actuator::servo) struct ShaftSignals<S> {
     pub added: Added<S>,
     /// Torque on the motor shaft that an end stop cancels.
     pub stop: S,
+    /// Torques of the meshes of a gear of several bodies.
+    pub meshes: [S; MESHES],
 }
 
 impl<S: Scalar> Shaft<S> {
@@ -33,10 +36,11 @@ impl<S: Scalar> Shaft<S> {
             brake: x.brake,
             load: loads.load,
             output_torque: loads.output_torque,
-            through: loads.through,
+            through: loads.delivered,
             unbalance: if d.unbalance { self.unbalance.torque(s.motor_position) } else { S::zero() },
-            added: self.train.added(&d.train, s.motor_position, loads.through, self.gear.per_ratio),
+            added: self.train.added(&d.train, s.motor_position, [loads.through, loads.delivered], self.gear.per_ratio),
             stop: self.stopped(d, x, s, &loads, torque - loads.load - dry),
+            meshes: loads.meshes,
         }
     }
 
@@ -55,7 +59,7 @@ impl<S: Scalar> Shaft<S> {
     fn stopped(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, loads: &Loads<S>, net: S) -> S {
         let zero = S::zero();
         if d.elastic {
-            let active = loads.through - loads.output_torque;
+            let active = loads.delivered - loads.output_torque;
             let limit = if d.load_side { self.load_side_friction(d, x) } else { zero };
             let net = active - active.clamp_abs(limit);
             let pressed = s.output_speed.equals(zero) & self.gear.output_stop.outwards(s.output_position, net);
@@ -113,6 +117,11 @@ impl<S: Scalar> Shaft<S> {
             return S::select(self.joined(s), whole, self.kinetic_of(s.motor_speed, s.output_speed));
         }
         let half = S::splat(0.5);
-        half * self.inertia * s.motor_speed * s.motor_speed + half * self.output_inertia * s.output_speed * s.output_speed
+        let ends = half * self.inertia * s.motor_speed * s.motor_speed + half * self.output_inertia * s.output_speed * s.output_speed;
+        if d.meshed {
+            ends + self.kinetic_of_bodies(s)
+        } else {
+            ends
+        }
     }
 }

@@ -101,6 +101,9 @@ impl<S: Scalar> Shaft<S> {
             self.vibration.step(&mut s.vibration, force, self.dt);
         }
         if FULL && d.elastic {
+            if EXTRA && d.meshed {
+                self.move_bodies(d, s, loads, S::splat(0.5) * (speed + new_speed));
+            }
             self.output_step::<EXTRA>(d, x, s, loads);
         } else if !(FULL && d.flanks) {
             s.output_position = self.drag::<EXTRA>(d, position, s.output_position);
@@ -152,7 +155,7 @@ impl<S: Scalar> Shaft<S> {
     #[inline(always)]
     fn output_step<const EXTRA: bool>(&self, d: &ShaftDetails, x: &Instant<S>, s: &mut ShaftState<S>, loads: &Loads<S>) {
         let speed = s.output_speed;
-        let active = loads.through - loads.output_torque;
+        let active = loads.delivered - loads.output_torque;
         let new_speed = if EXTRA && d.load_side {
             let dry = self.load_side_friction(d, x);
             let net = Friction::net_torque(active, S::zero(), (self.load_damping).fma(speed, speed.signed(dry)), speed, dry);
@@ -172,7 +175,9 @@ impl<S: Scalar> Shaft<S> {
             }
             let motor = s.motor_speed * self.gear.per_ratio;
             let stopped = S::splat(0.5) * self.output_inertia * (new_speed * new_speed - end_speed * end_speed);
-            s.work.impact = s.work.impact + self.dt * loads.through * (motor - middle) + stopped;
+            // Motor and bodies have given their part to the meshes.
+            let wound = if EXTRA && d.meshed { -(self.dt * loads.delivered * middle) } else { self.dt * loads.through * (motor - middle) };
+            s.work.impact = s.work.impact + wound + stopped;
         }
         s.output_position = position;
         s.output_speed = end_speed;

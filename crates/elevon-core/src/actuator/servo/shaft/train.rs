@@ -108,9 +108,9 @@ impl<S: Scalar> Train<S> {
         }
     }
 
-    /// At a motor angle; `through` is the torque through the gear at the output, `per_ratio` the gear's.
+    /// At a motor angle; the torque through the gear as the motor's side and as the output feel it, `per_ratio` the gear's.
     #[inline(always)]
-    pub(super) fn added(&self, d: &TrainDetails, angle: S, through: S, per_ratio: S) -> Added<S> {
+    pub(super) fn added(&self, d: &TrainDetails, angle: S, [through, delivered]: [S; 2], per_ratio: S) -> Added<S> {
         let zero = S::zero();
         let mut added = Added { cogging: zero, bearing: BearingTorque { torque: zero, friction: zero }, rub: [zero; 2], teeth: zero };
         if d.cogging {
@@ -124,7 +124,7 @@ impl<S: Scalar> Train<S> {
             added.rub = self.rub.contact(&self.eccentricity, angle);
         }
         if d.teeth {
-            added.teeth = self.teeth.lag(angle).torque(through);
+            added.teeth = self.teeth.lag(angle).torque(delivered);
         }
         added
     }
