@@ -293,6 +293,36 @@ def test_a_gear_that_cannot_be_is_refused(change: dict[str, Any], place: str) ->
     assert place in [finding["path"] for finding in found if finding["severity"] == "error"]
 
 
+FAULTS = {
+    ("friction", "transmission"): 0.5, ("lubrication", "transmission"): 1.0,
+    ("backlash", "transmission"): 0.01, ("jam", "transmission"): 0.5,
+    ("tooth_wear", "gear"): 0.005, ("chipped_tooth", "gear"): 0.005,
+    ("bearing", "bearing.outer"): 2e-3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fidelity", ["high", "low"])
+def test_every_fault_of_the_transmission_moves_the_planets_output(fidelity: str) -> None:
+    """Against the healthy run of the same motion, under a load that reverses."""
+    chosen = elevon.Actuator.load("torino-rotary").with_values({"gear.model": "wolfrom"})
+    motion = {"load": {"output": {"terms": [term("sine", amplitude=2.0, frequency=8.0)]}}}
+    command = [term("sine", amplitude="2 deg", frequency="5 Hz")]
+    faults = [{"kind": k, "place": p, "severity": x} for (k, p), x in FAULTS.items()]
+    runs = [
+        elevon.Run(
+            chosen,
+            make_scenario(duration=0.2, command=command, extra={**motion, "fault": some}),
+        )
+        for some in ([], *([fault] for fault in faults))
+    ]
+    healthy, *faulty = elevon.simulate_batch(
+        runs, fidelity=fidelity, record="output_position@2 kHz"
+    )
+    reference = healthy["output_position"].values
+    moved = [float(np.max(np.abs(x["output_position"].values - reference))) for x in faulty]
+    assert [fault for fault, far in zip(FAULTS, moved, strict=True) if far < 1e-6] == []
+
+
 def test_sensitivities_of_the_reduced_order_model_are_those_of_differences() -> None:
     """By the planets' inertia and by the backlash of a mesh."""
     scenario = make_scenario(duration=0.2, extra={"load": {"shaft": {"terms": [constant(-1.0)]}}})

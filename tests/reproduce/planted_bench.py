@@ -75,6 +75,27 @@ def control(factor=1.0, speed=24.19, end=None):
     return ControlResult([], speed, 24.19, "", roots).checks
 
 
+# --- torino-gear ---------------------------------------------------------------------------------
+def gear(mesh=0.18, rms=0.001, **wrong):
+    """Return the checks of three models and three meshes, one number of them wrong."""
+    from elevon.reproduce.torino_bench.gear import (
+        ELASTIC,
+        LUMPED,
+        PLANETS,
+        GearResult,
+        GearRow,
+        MeshRow,
+    )
+
+    planets = {"lost_motion_deg": 0.3656, "stiffness_nm_per_rad": 1045.0, "loaded_deg": 0.4752}
+    planets |= wrong
+    rows = [GearRow(PLANETS, moving_deg=0.36, loaded_rms_deg=0.0, **planets),
+            GearRow(ELASTIC, 0.3656, 1045.0, 0.36, 0.4752, rms),
+            GearRow(LUMPED, 0.3656, None, 0.36, 0.3656, 0.05)]  # fmt: skip
+    meshes = [MeshRow("first", 0.992, mesh, 50.0), MeshRow("second", 1.0, 0.1856, 50.0)]
+    return GearResult(rows, meshes, 0.0045, "", np.zeros(1), {}).checks
+
+
 #: Case to the checks without an error.
 BENCH_GOOD = {
     "torino-validation": bench_and_model,
@@ -82,6 +103,7 @@ BENCH_GOOD = {
     "torino-drops": drops,
     "torino-fmeca": fmeca,
     "torino-control": control,
+    "torino-gear": gear,
 }
 
 #: Case and check to the checks with one.
@@ -123,6 +145,15 @@ BENCH_PLANTED = {
     ("torino-control", "no-load speed less the drive's limit"): partial(control, speed=25.0),
     ("torino-control", "no-load speed, secondary controls that assist"):
         partial(control, speed=14.0),
+    ("torino-gear", "lost motion of the planets less the printed"):
+        partial(gear, lost_motion_deg=0.3680),
+    ("torino-gear", "lost motion of the planets less the sum of its meshes"):
+        partial(gear, mesh=0.19),
+    ("torino-gear", "stiffness of the planets less that of the drops"):
+        partial(gear, stiffness_nm_per_rad=625.0),
+    ("torino-gear", "loaded sine: planets less one elastic backlash, RMS"): partial(gear, rms=0.01),
+    ("torino-gear", "loaded sine: wind-up that one backlash leaves out"):
+        partial(gear, loaded_deg=0.3656),
     ("torino-fmeca", "least change of a line"): partial(fmeca, change_percent=0.1),
     ("torino-fmeca", "faults called healthy"): partial(fmeca, seen="called healthy"),
     ("torino-fmeca", "faults named as another"): partial(fmeca, seen="another is named"),
