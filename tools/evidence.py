@@ -28,9 +28,9 @@ RUNS = PAGES / "runs"
 #: Published cases that need no foreign data and take at most some minutes.
 CASES = (
     "torino-backlash", "torino-compliance", "torino-validation", "torino-loaded", "torino-drops",
-    "torino-fmeca", "low-fidelity", "nasa-current", "nasa-thermal", "pisa-functional",
-    "pisa-friction", "pisa-hydraulic", "nasa-faults", "nasa-flight", "pisa-validation",
-    "pisa-commutation",
+    "torino-fmeca", "torino-gear", "low-fidelity", "nasa-current", "nasa-thermal",
+    "pisa-functional", "pisa-friction", "pisa-hydraulic", "nasa-faults", "nasa-flight",
+    "pisa-validation", "pisa-commutation",
 )  # fmt: skip
 BLOCK = re.compile(r"^<!-- (run|checks|judged) (\S+) -->\n.*?^<!-- end -->$", re.M | re.S)
 
