@@ -61,3 +61,31 @@ def test_doubts_of_the_core_are_warnings_and_its_refusals_errors(monkeypatch):
     found[0] = {**found[0], "severity": "error"}
     with pytest.raises(elevon.InputError, match="near its limit"):
         acting.check_values(ACTUATOR, "high")
+
+
+def faulty(*faults: str) -> elevon.Scenario:
+    return elevon.Scenario.from_dict(
+        {
+            "duration": 0.01,
+            "fault": [
+                dict(zip(("kind", "place", "severity"), each.split(), strict=True))
+                for each in faults
+            ],
+        }
+    )
+
+
+def test_a_fault_that_changes_nothing_is_refused():
+    with pytest.raises(elevon.InputError, match=r"connector_open@supply has no effect .*link_cap"):
+        elevon.simulate(ACTUATOR, faulty("connector_open supply 1"), fidelity="high")
+    held = ACTUATOR.with_values({"inverter.link_capacitance": 1e-3})
+    elevon.simulate(held, faulty("connector_open supply 1"), fidelity="high")
+
+
+def test_a_fault_is_judged_beside_those_of_another_fidelity():
+    """A contact of a winding to ground is of the switching model alone."""
+    elevon.simulate(
+        ACTUATOR,
+        faulty("ground_short motor.phase_b 0.3", "friction transmission 2"),
+        fidelity="high",
+    )

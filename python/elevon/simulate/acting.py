@@ -115,21 +115,41 @@ def _reasons(
 
 def _refuse_inert(actuator: Actuator, compiled: CompiledScenario) -> None:
     """Refuse faults that change nothing with these values, whatever the fidelity."""
-    from elevon import _core
-
     vector = _with_mode(actuator, compiled.command_mode)
     for fault in compiled.faults:
         record = find_record(fault["kind"], fault["place"], actuator.wiring)
         paths = list(record.targets[fault["place"]])
-        idle: list[dict[str, str]] = []
-        for fidelity in record.fidelities if fault["severity"] != 0.0 else ():
-            rows = _core.not_acting(actuator.wiring, fidelity, vector, compiled.faults, paths)
-            idle.append({item["path"]: item["reason"] for item in rows})
-        if paths and idle and all(path in reasons for path in paths for reasons in idle):
+        if fault["severity"] == 0.0 or not paths:
+            continue
+        idle: dict[str, str] = {}
+        for fidelity in record.fidelities:
+            idle = _idle(actuator.wiring, fidelity, vector, compiled.faults, paths)
+            if not idle.keys() >= set(paths):
+                break
+        else:
             name = f"fault {record.kind}@{fault['place']}"
             raise NotActingError(
-                f"{name} has no effect in {actuator.name}: {paths[0]}: {idle[0][paths[0]]}"
+                f"{name} has no effect in {actuator.name}: {paths[0]}: {idle[paths[0]]}"
             )
+
+
+def _idle(
+    wiring: str,
+    fidelity: str,
+    vector: npt.NDArray[np.float64],
+    faults: Sequence[Mapping[str, Any]],
+    paths: Sequence[str],
+) -> dict[str, str]:
+    """Return which of the parameters have no effect at a fidelity, beside the faults it knows."""
+    from elevon import _core
+
+    known = [
+        fault
+        for fault in faults
+        if fidelity in find_record(fault["kind"], fault["place"], wiring).fidelities
+    ]
+    rows = _core.not_acting(wiring, fidelity, vector, known, list(paths))
+    return {item["path"]: item["reason"] for item in rows}
 
 
 def _touched(fault: Mapping[str, Any], wiring: str) -> Iterator[str]:
