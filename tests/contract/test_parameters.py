@@ -72,12 +72,12 @@ def test_a_switch_is_as_it_was_below_one_half_by_value_and_by_fault(
     """Every parameter that a fault switches on or off."""
     cell = Cell(name, fidelity)
     known = records(cell.actuator().wiring)
-    rest = resting(cell)
+    without_effect = resting(cell)
     # A fault that changes nothing with these values is refused (tests/simulate/test_not_acting.py).
     switched = [
         (kind, place, record)
         for kind, place, record in cell.faults()
-        if "1: " in record["effect"] and not set(record["targets"][place]) <= set(rest)
+        if "1: " in record["effect"] and not set(record["targets"][place]) <= set(without_effect)
     ]
     assert switched
     broken = [

@@ -78,8 +78,8 @@ def faulty(*faults: str) -> elevon.Scenario:
 def test_a_fault_that_changes_nothing_is_refused():
     with pytest.raises(elevon.InputError, match=r"connector_open@supply has no effect .*link_cap"):
         elevon.simulate(ACTUATOR, faulty("connector_open supply 1"), fidelity="high")
-    held = ACTUATOR.with_values({"inverter.link_capacitance": 1e-3})
-    elevon.simulate(held, faulty("connector_open supply 1"), fidelity="high")
+    buffered = ACTUATOR.with_values({"inverter.link_capacitance": 1e-3})
+    elevon.simulate(buffered, faulty("connector_open supply 1"), fidelity="high")
 
 
 def test_a_fault_is_judged_beside_those_of_another_fidelity():
