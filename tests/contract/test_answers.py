@@ -97,7 +97,7 @@ ANSWERS = {
               SIX, True),
     "learn-spread": (("log/log.csv", "base/log.csv", *ROTARY, "--out", "spread.toml"),
                      r"^spread learnt: 2 days of 1 unit, 2 logs -> spread\.toml$", LOGS, True),
-    "diagnose-train": (("--out", "own.npz", "--units", "8", "--low-units", "8", "--rounds", "50",
+    "diagnose-train": (("--out", "own.npz", "--units", "8", "--low-units", "8", "--rounds", "10",
                         "--test-units", "2"), r"^trained: own\.npz", (), True),
     "live": (("--fidelity", "low", "--static", "page"), r"^7 files in page$", (), True),
     "demo": (("--part", "bench", "--out", "demo"), r"^\d+ of \d+ checks passed$", (), True),

@@ -120,7 +120,7 @@ def test_trees_as_arrays_say_what_the_library_says(classes):
     labels += (values[:, 1] > 0.5) * (classes == 3)
     model = ensemble.GradientBoostingClassifier(init="zero", n_estimators=8, random_state=0)
     model.fit(values, labels)
-    trees = Trees.build(Trees.of(model).arrays())
+    trees = Trees.stored(Trees.of(model).arrays())
     scores = trees.scores(values.astype(float))
     share = np.exp(scores - np.logaddexp.reduce(scores, axis=1)[:, None])
     np.testing.assert_allclose(share, model.predict_proba(values), atol=1e-9)

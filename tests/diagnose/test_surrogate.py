@@ -1,4 +1,4 @@
-"""Diagnosis by the trained networks."""
+"""Diagnosis by the trained trees."""
 
 import json
 from dataclasses import replace
@@ -216,14 +216,14 @@ def test_the_file_that_ships(tmp_path):
     ours = shipped()
     assert set(ours.tests) == {"backlash", "loaded"}
     path = ours.save(tmp_path / "again.npz")
-    assert path.stat().st_size < 500_000
+    assert path.stat().st_size < 3_000_000
     again = Surrogate.load(path)
     for name, test in ours.tests.items():
         for view, head in test.heads.items():
             other = again.tests[name].heads[view]
             np.testing.assert_array_equal(head.known, other.known)
-            for a, b in zip(head.ensemble.weights, other.ensemble.weights, strict=True):
-                np.testing.assert_array_equal(a, b)
+            for part, kept in head.ensemble.trees.arrays().items():
+                np.testing.assert_array_equal(kept, other.ensemble.trees.arrays()[part])
     for damage in (path.read_bytes()[:-2000], b"nothing"):
         (tmp_path / "bad.npz").write_bytes(damage)
         with pytest.raises(FormatError):
@@ -283,7 +283,7 @@ def test_the_command_line(elevon_cli, tmp_path):  # noqa: F811
 @pytest.mark.long
 def test_training_by_one_command(elevon_cli, tmp_path):  # noqa: F811
     out = tmp_path / "own.npz"
-    words = ("diagnose-train", "--out", out, "--units", "8", "--low-units", "16", "--rounds", "200",
+    words = ("diagnose-train", "--out", out, "--units", "8", "--low-units", "16", "--rounds", "20",
              "--test-units", "2", "--runs", tmp_path / "runs", "--json")  # fmt: skip
     first = elevon_cli(*words)
     assert first.code == 0

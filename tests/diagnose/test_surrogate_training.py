@@ -1,22 +1,24 @@
-"""Training of the surrogate's networks, their calibration, and how they are judged."""
+"""Training of the surrogate's trees, their calibration, and how they are judged."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from elevon.diagnose.learning.trees import Trees
 from elevon.diagnose.surrogate import shipped
+from elevon.diagnose.surrogate.boosted import (
+    Batch,
+    Ensemble,
+    Opinion,
+    _nodes,
+    either,
+    honest,
+    trained,
+)
 from elevon.diagnose.surrogate.features import NAMES
 from elevon.diagnose.surrogate.fit import TrainingPlan, fitted
 from elevon.diagnose.surrogate.judge import judged, judged_at
-from elevon.diagnose.surrogate.network import (
-    Batch,
-    Ensemble,
-    either,
-    honest,
-    loss_and_gradient,
-    train,
-)
 from elevon.diagnose.surrogate.population import FAULTS, drawn_faults, learned
 from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
@@ -24,43 +26,26 @@ from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 
 
-def _batch(rng, n=40, inputs=5, faults=2):
-    there = rng.random((n, faults)) < 0.5
-    return Batch(rng.standard_normal((n, inputs)), there * rng.uniform(-1.0, 1.0, (n, faults)))
-
-
-def test_the_gradient_is_that_of_the_loss():
-    rng = np.random.default_rng(0)
-    batch = _batch(rng)
-    weights = [0.3 * rng.standard_normal(s) for s in ((5, 6), (1, 6), (6, 7), (1, 7))]
-    _, gradient = loss_and_gradient(weights, batch)
-    for k, layer in enumerate(weights):
-        way = rng.standard_normal(layer.shape)
-        ends = []
-        for step in (1e-5, -1e-5):
-            moved = [w + step * way if j == k else w for j, w in enumerate(weights)]
-            ends.append(loss_and_gradient(moved, batch)[0])
-        slope = (ends[0] - ends[1]) / 2e-5
-        assert slope == pytest.approx(float(np.sum(gradient[k] * way)), rel=1e-6, abs=1e-9)
-
-
-def test_training_learns_a_linear_law_and_its_noise():
-    """Input = size + noise of deviation 0.2: the size's deviation is the posterior's."""
+def test_training_learns_a_linear_law():
+    """Input = size + noise of deviation 0.2; a second fault is never there, a third always."""
 
     def draw(rng, n=128):
-        size = np.where(rng.random((n, 1)) < 0.5, rng.standard_normal((n, 1)), 0.0)
-        return Batch(size + 0.2 * rng.standard_normal((n, 1)), size)
+        there = np.array([0.5, 0.0, 1.0]) > rng.random((n, 3))
+        size = np.where(there, rng.standard_normal((n, 3)), 0.0)
+        return Batch(size + 0.2 * rng.standard_normal((n, 3)), size)
 
-    ensemble = train(draw, 4, members=1, rounds=1500, seed=0)
+    ensemble = trained(draw, draws=30, rounds=40, seed=0)
     fresh = draw(np.random.default_rng(9), 4000)
     opinion = ensemble.says(fresh.inputs)
     there = fresh.size[:, 0] != 0.0
-    score = ((fresh.size - opinion.size) / opinion.deviation)[there, 0]
-    assert np.std(score) == pytest.approx(1.0, abs=0.1)
-    assert np.median(opinion.deviation[there]) == pytest.approx(0.2 / np.sqrt(1.04), rel=0.15)
+    error = (fresh.size - opinion.size)[there, 0]
+    assert np.std(error) == pytest.approx(0.2 / np.sqrt(1.04), rel=0.2)
     large = np.abs(fresh.inputs[:, 0]) > 1.0
-    assert (opinion.faulty[large] > 2.0).all()
-    assert opinion.faulty[np.abs(fresh.inputs[:, 0]) < 0.1].max() < 0.0
+    assert (opinion.presence[large, 0] > 1.0).all()
+    assert np.median(opinion.presence[np.abs(fresh.inputs[:, 0]) < 0.1, 0]) < -1.0
+    assert opinion.presence[:, 1].max() < -5.0 < 5.0 < opinion.presence[:, 2].min()
+    both = Ensemble.of([ensemble, trained(draw, draws=5, rounds=40, seed=1)])
+    np.testing.assert_allclose(both.says(fresh.inputs).each[0], opinion.each[0])
 
 
 def test_calibrated_logits():
@@ -95,7 +80,7 @@ def _table(units, rng, unlike=0.1):
 def test_calibration_holds_on_units_never_seen():
     rng = np.random.default_rng(3)
     tables = {"backlash": _table(40, rng)}
-    plan = TrainingPlan(folds=2, members=1, rounds=150)
+    plan = TrainingPlan(folds=2, rounds=30, draws=20)
     result = fitted(tables, {}, plan, {})
     scores = judged(result, {"backlash": _table(40, rng)})["backlash.relative"]
     assert scores["covered"] / scores["severities"] > 0.82
@@ -106,7 +91,7 @@ def test_calibration_holds_on_units_never_seen():
 @pytest.mark.long
 def test_units_are_judged_at_the_severities_asked():
     rng = np.random.default_rng(5)
-    tables, plan = {"loaded": _table(40, rng, 0.0)}, TrainingPlan(folds=2, members=1, rounds=400)
+    tables, plan = {"loaded": _table(40, rng, 0.0)}, TrainingPlan(folds=2, rounds=60, draws=60)
     drawn = _table(20, rng, 0.0)
     surrogate = fitted(tables, {}, plan, {})
     severity = np.zeros((100, len(FAULTS)))
@@ -128,18 +113,33 @@ def test_units_are_judged_at_the_severities_asked():
         assert fault["median_error"] < small["median_error"]
 
 
-def test_a_chance_is_a_rank_among_runs_that_the_networks_have_not_seen():
-    """Two parts, the second with logits 10 higher for anything: each has its own healthy runs."""
-    weights = [np.ones((2, 1, 4)), np.array([[[0.0, 0.0, 0.0, 0.0]], [[10.0, 0.0, 0.0, 0.0]]])]
+def test_a_chance_is_a_rank_among_runs_that_the_members_have_not_seen():
+    """Two members, the second with logits 10 higher for anything: each has its own healthy runs."""
+    values = np.array([-9.0, -2.2, 3.0])
     low, high = np.arange(-4.0, 0.0), np.arange(-4.5, 0.0)
     head = replace(
-        shipped().tests["backlash"].heads["relative"], ensemble=Ensemble(weights),
+        shipped().tests["backlash"].heads["relative"],
         scaling=np.tile([1.0, 1.0, 0.0], (2, 1)), healthy=np.concatenate((low, high + 10.0)),
         fold=np.repeat([0.0, 1.0], [len(low), len(high)]),
     )  # fmt: skip
-    x = np.array([[-9.0], [-2.2], [3.0]])
-    expected = [(np.sum(np.concatenate((low, high)) >= v) + 1.0) / 10.0 for v in x[:, 0]]
-    np.testing.assert_allclose(head.chances(head.ensemble.says(x)), expected)
+    each = np.stack([values, values + 10.0])[:, :, None]
+    opinion = Opinion(each.mean(axis=0), np.zeros((3, 1)), each)
+    expected = [(np.sum(np.concatenate((low, high)) >= v) + 1.0) / 10.0 for v in values]
+    np.testing.assert_allclose(head.chances(opinion), expected)
+
+
+@pytest.mark.parametrize("kind", ["Classifier", "Regressor"])
+def test_trees_by_histograms_say_what_the_library_says(kind):
+    library = pytest.importorskip("sklearn.ensemble")
+    rng = np.random.default_rng(2)
+    values = rng.standard_normal((300, 4)).astype(np.float32).astype(float)
+    truth = values[:, 0] + rng.normal(0.0, 0.3, 300)
+    model = getattr(library, f"HistGradientBoosting{kind}")(max_iter=8, max_leaf_nodes=6)
+    model.fit(values, truth > 0.0 if kind == "Classifier" else truth)
+    nodes, start = _nodes(model)
+    trees = Trees.stored(Trees.of_histograms([nodes, nodes[:2]]).arrays())
+    says = (model.decision_function if kind == "Classifier" else model.predict)(values)
+    np.testing.assert_allclose(start + trees.scores(values)[:, 0], says, atol=1e-5)
 
 
 def test_references_are_other_days_of_the_same_unit():

@@ -43,7 +43,7 @@ def trained(
         On the switching model, on the reduced-order one beside them, and on the former for the
         test.
     rounds : int
-        Training steps of a network.
+        Boosting rounds of each fault.
     seed : int
         Of everything.
     folder : path, optional

@@ -173,7 +173,7 @@ def _assembled(about: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]])
     trees = {n.removeprefix("trees."): a for n, a in arrays.items() if n.startswith("trees.")}
     return LearnedClasses(
         tuple(map(str, about["features"])), _discriminant(classes, stored),
-        Trees.build(trees) if trees else None, float(about["temperature"]),
+        Trees.stored(trees) if trees else None, float(about["temperature"]),
         real["healthy"], real["distances"], real["command"], float(about["pace"]),
         float(about["seconds"]),
         None if about["pole_pairs"] is None else float(about["pole_pairs"]), about["report"],

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sklearn.ensemble import GradientBoostingClassifier
 
 _NAMES = ("feature", "threshold", "left", "right", "value", "roots")
+_WAYS = ("left", "right")
 
 
 @dataclass(frozen=True)
@@ -59,12 +60,23 @@ class Trees:
         return np.asarray(total)
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
-        """Return what a file holds of it."""
-        return {name: getattr(self, name) for name in _NAMES}
+        """Return what a file holds of it: children by how far behind their node they stand."""
+        at = np.arange(len(self.feature))
+        out = {"feature": self.feature, "roots": self.roots}
+        out |= {f"to_{way}": getattr(self, way) - at for way in _WAYS}
+        small = {n: a.astype(np.min_scalar_type(int(a.max()))) for n, a in out.items()}
+        return small | {n: getattr(self, n).astype(np.float32) for n in ("threshold", "value")}
+
+    @classmethod
+    def stored(cls, data: Mapping[str, npt.NDArray[np.generic]]) -> Trees:
+        """Return the trees of a file's arrays; errors as `build`."""
+        at = np.arange(len(data["feature"]))
+        ways = {way: at + np.asarray(data[f"to_{way}"], dtype=np.int64) for way in _WAYS}
+        return cls.build({**data, **ways})
 
     @classmethod
     def build(cls, data: Mapping[str, npt.NDArray[np.generic]]) -> Trees:
-        """Return the trees of a file's arrays.
+        """Return trees of arrays by name.
 
         Raises
         ------
@@ -112,3 +124,35 @@ class Trees:
             roots[place] = first
             first += tree.node_count
         return cls.build({n: np.concatenate(rows) for n, rows in nodes.items()} | {"roots": roots})
+
+    @classmethod
+    def of_histograms(cls, columns: Sequence[Sequence[npt.NDArray[Any]]]) -> Trees:
+        """Return the trees of models by histograms: of each column those of its rounds.
+
+        Columns of fewer rounds than others have a leaf of zero in their place.
+        """
+        nodes: dict[str, list[npt.NDArray[np.generic]]] = {n: [np.zeros(1)] for n in _NAMES[:5]}
+        roots = np.zeros((max([len(c) for c in columns] + [1]), len(columns)), dtype=np.int64)
+        first = 1
+        for k, trees in enumerate(columns):
+            for round_, tree in enumerate(trees):
+                leaf, at = tree["is_leaf"].astype(bool), np.arange(len(tree))
+                nodes["feature"].append(np.where(leaf, 0, tree["feature_idx"]))
+                nodes["threshold"].append(np.where(leaf, 0.0, tree["num_threshold"]))
+                nodes["left"].append(first + np.where(leaf, at, tree["left"]))
+                nodes["right"].append(first + np.where(leaf, at, tree["right"]))
+                nodes["value"].append(np.where(leaf, tree["value"], 0.0))
+                roots[round_, k] = first
+                first += len(tree)
+        return cls.build({n: np.concatenate(rows) for n, rows in nodes.items()} | {"roots": roots})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Trees]) -> Trees:
+        """Return trees of equally many rounds as one, their columns side by side."""
+        ends = np.cumsum([0, *(len(p.feature) for p in parts)])
+        moved = [
+            {n: getattr(p, n) + (end if n in (*_WAYS, "roots") else 0) for n in _NAMES}
+            for p, end in zip(parts, ends, strict=False)
+        ]
+        rows = {n: np.concatenate([m[n] for m in moved]) for n in _NAMES[:5]}
+        return cls.build(rows | {"roots": np.hstack([m["roots"] for m in moved])})

@@ -1,4 +1,4 @@
-"""Diagnosis by a trained network: features of a log to faults, in milliseconds."""
+"""Diagnosis by trained trees: features of a log to faults, in milliseconds."""
 
 from elevon.diagnose.surrogate.answer import diagnose_by_both, diagnose_by_surrogate
 from elevon.diagnose.surrogate.model import Surrogate, shipped

@@ -35,7 +35,7 @@ def diagnose_by_surrogate(
     false_alarm: float = 0.05,
     surrogate: Surrogate | None = None,
 ) -> Diagnosis:
-    """Say what is wrong by a trained network.
+    """Say what is wrong by trained trees.
 
     Parameters
     ----------

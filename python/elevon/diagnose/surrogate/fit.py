@@ -9,21 +9,21 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
-from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
-from elevon.diagnose.surrogate.network import (
+from elevon.diagnose.surrogate.boosted import (
     Batch,
     Ensemble,
     Opinion,
     either,
     honest,
-    stored,
-    train,
+    trained,
 )
+from elevon.diagnose.surrogate.features import NAMES, SCALES, changes
+from elevon.diagnose.surrogate.model import Head, Surrogate, TestModel
 from elevon.diagnose.surrogate.population import ALIKE, FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, sizes
 from elevon.diagnose.surrogate.table import TrainingTable
 from elevon.diagnose.surrogate.view import VIEWS, View
+from elevon.errors import Interrupted
 from elevon.progress import Progress, part
 
 FALSE_ALARM = 0.05
@@ -42,16 +42,16 @@ class TrainingPlan:
     ----------
     folds : int
         Parts of the units, those that are built alike together; each part is held out of the
-        networks that are calibrated on it.
-    members, rounds, batch : int
-        Networks of a fold, steps of each, runs of a step.
+        member that is calibrated on it.
+    rounds, draws, batch : int
+        Trees of each fault; batches that a member is trained on, runs of a batch.
     seed : int
-        Of starts and batches.
+        Of the batches.
     """
 
     folds: int = 4
-    members: int = 2
-    rounds: int = 5000
+    rounds: int = 60
+    draws: int = 100
     batch: int = 256
     seed: int = 0
 
@@ -102,17 +102,11 @@ def _head(
     ensembles, parts = [], []
     for k in range(plan.folds):
         train_rows = usable[fold != k]
+        if progress is not None and progress(k / plan.folds) is False:
+            raise Interrupted("training was interrupted")
+        batches = _sampler(high, train_rows, low, view, plan.batch)
         ensembles.append(
-            stored(
-                train(
-                    _sampler(high, train_rows, low, view, plan.batch),
-                    3 * len(FAULTS) + 1,
-                    members=plan.members,
-                    rounds=plan.rounds,
-                    seed=plan.seed + 1000 * k,
-                    progress=part(progress, k / plan.folds, (k + 1) / plan.folds),
-                )
-            )
+            trained(batches, draws=plan.draws, rounds=plan.rounds, seed=plan.seed + 1000 * k)
         )
         validation = usable[fold == k]
         parts.append((validation, ensembles[-1].says(high.inputs(view, validation, rng))))
@@ -121,7 +115,7 @@ def _head(
         rows, np.concatenate([np.full(len(numbers), k) for k, (numbers, _) in enumerate(parts)]),
         _stacked([opinion for _, opinion in parts]),
     )  # fmt: skip
-    return _calibrated(high, low, view, _union(ensembles), validation=validation, rng=rng)
+    return _calibrated(high, low, view, Ensemble.of(ensembles), validation=validation, rng=rng)
 
 
 def _folds(unit: npt.NDArray[np.int64], folds: int) -> npt.NDArray[np.int64]:
@@ -132,7 +126,7 @@ def _folds(unit: npt.NDArray[np.int64], folds: int) -> npt.NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class _Validation:
-    """Runs, shape (n,), the part each is of, and what networks say that have not seen it."""
+    """Runs, shape (n,), the part each is of, and what the member says that has not seen it."""
 
     rows: npt.NDArray[np.int64]
     fold: npt.NDArray[np.int64]
@@ -166,13 +160,8 @@ def _sampler(
     return batch
 
 
-def _union(ensembles: Sequence[Ensemble]) -> Ensemble:
-    layers = zip(*(e.weights for e in ensembles), strict=True)
-    return Ensemble([np.concatenate(layer) for layer in layers])
-
-
 def _stacked(opinions: Sequence[Opinion]) -> Opinion:
-    axes = {"presence": 0, "faulty": 0, "size": 0, "deviation": 0, "each": 1}
+    axes = {"presence": 0, "size": 0, "each": 1}
     return Opinion(
         *(np.concatenate([getattr(o, n) for o in opinions], axis=a) for n, a in axes.items())
     )
@@ -215,7 +204,7 @@ def _calibrated(
     ]
     union = either(honest(np.array(calibrations), opinion.presence))
     scaling = np.array([*calibrations, _calibration(union, faulty)])
-    score = np.abs(sizes(severity) - opinion.size) / opinion.deviation
+    score = np.abs(sizes(severity) - opinion.size)
     conformal = np.array([_quantile(score[there[:, k], k]) for k in range(there.shape[1])])
     change = _changes(high, view, rows, rng)
     known = _known(high, low, view, rng)
@@ -320,7 +309,7 @@ def scores(head: Head, opinion: Opinion, severity: Floats, chance: Floats) -> di
     logit = honest(head.scaling[:-1], opinion.presence)
     probability = 1.0 / (1.0 + np.exp(-logit))
     alarm = chance <= FALSE_ALARM
-    inside = np.abs(sizes(severity) - opinion.size) <= head.conformal * opinion.deviation
+    inside = np.abs(sizes(severity) - opinion.size) <= head.conformal
     single = there.sum(axis=1) == 1
     best = probability.argmax(axis=1) == there.argmax(axis=1)
     named = ((probability > 0.5) == there).all(axis=1)

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from elevon.diagnose.surrogate.boosted import Opinion, honest
 from elevon.diagnose.surrogate.fit import FALSE_ALARM, scores
 from elevon.diagnose.surrogate.model import Head, Surrogate
-from elevon.diagnose.surrogate.network import Opinion, honest
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.sampling import Rows, severities
 from elevon.diagnose.surrogate.table import SINGLE_FAULTS, TrainingTable
@@ -84,10 +84,7 @@ def _outside(head: Head, rows_of: Rows, rows: Index) -> int:
 
 
 def _only(opinion: Opinion, rows: Index) -> Opinion:
-    return Opinion(
-        opinion.presence[rows], opinion.faulty[rows], opinion.size[rows], opinion.deviation[rows],
-        opinion.each[:, rows],
-    )  # fmt: skip
+    return Opinion(opinion.presence[rows], opinion.size[rows], opinion.each[:, rows])
 
 
 def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[str, object]:
@@ -97,8 +94,7 @@ def _of_fault(head: Head, opinion: Opinion, at: int, severity: float) -> dict[st
     first = logit.argmax(axis=1) == at
     alone = (logit > 0.0).sum(axis=1) == (logit[:, at] > 0.0)
     middle, low, high = (
-        severities(opinion.size + k * head.conformal * opinion.deviation)[:, at]
-        for k in (0.0, -1.0, 1.0)
+        severities(opinion.size + k * head.conformal)[:, at] for k in (0.0, -1.0, 1.0)
     )
     return {
         "severity": severity,

@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.learning.archive import read_archive, write_archive
+from elevon.diagnose.learning.trees import Trees
+from elevon.diagnose.surrogate.boosted import Ensemble, Opinion, either, honest
 from elevon.diagnose.surrogate.features import NAMES, SurrogateFeatures
-from elevon.diagnose.surrogate.network import Ensemble, Opinion, either, honest
 from elevon.diagnose.surrogate.pack import packed, unpacked
 from elevon.diagnose.surrogate.population import FAULTS
 from elevon.diagnose.surrogate.view import VIEWS, View
@@ -60,7 +61,7 @@ class LogOpinion:
 
 @dataclass(frozen=True)
 class Head:
-    """Networks of one test and view, with what held-out units made of them.
+    """Trees of one test and view, with what held-out units made of them.
 
     Attributes
     ----------
@@ -71,11 +72,11 @@ class Head:
     scaling : ndarray, shape (f + 1, 3)
         What makes the logits honest (`honest`); the last row is for that of any fault.
     conformal : ndarray, shape (f,)
-        Deviations that hold 90 % of held-out sizes.
+        Errors that hold 90 % of held-out sizes.
     healthy : ndarray, shape (h,)
         Logits of any fault (`either`) of healthy runs, by the members that have not seen them.
     fold : ndarray, shape (h,)
-        Number of those members' part of the ensemble; the parts are of equal size.
+        Number of the member that has not.
     known : ndarray, shape (p, k)
         Changes of training runs, as arsinh.
     low, high : ndarray, shape (k,)
@@ -115,7 +116,7 @@ class Head:
             float(honest(self.scaling[-1:], either(presence)[None])[0]),
             float(self.chances(opinion)[0]),
             opinion.size[0],
-            self.conformal * opinion.deviation[0],
+            self.conformal,
             change,
             self.outside(change, None if healthy is None else self.view.context(healthy)[0]),
         )
@@ -123,15 +124,13 @@ class Head:
     def chances(self, opinion: Opinion) -> Floats:
         """Return how often a healthy unit looks as faulty, shape (n,).
 
-        Each part of the ensemble is held against the healthy runs that it has not seen, and the
-        ranks are counted together (cross-conformal prediction; Vovk, 2015).
+        Each member is held against the healthy runs that it has not seen, and the ranks are
+        counted together (cross-conformal prediction; Vovk, 2015).
         """
-        parts = int(self.fold.max()) + 1
-        each = opinion.each.reshape(parts, -1, *opinion.presence.shape).mean(axis=1)
-        score = either(honest(self.scaling[:-1], each))
+        score = either(honest(self.scaling[:-1], opinion.each))
         above = sum(
             len(scores) - np.searchsorted(np.sort(scores), score[k])
-            for k, scores in ((k, self.healthy[self.fold == k]) for k in range(parts))
+            for k, scores in ((k, self.healthy[self.fold == k]) for k in range(len(score)))
         )
         return np.asarray((above + 1.0) / (len(self.healthy) + 1.0))
 
@@ -188,7 +187,7 @@ class TestModel:
 
 @dataclass(frozen=True)
 class Surrogate:
-    """Trained networks.
+    """What was trained.
 
     Attributes
     ----------
@@ -214,6 +213,7 @@ class Surrogate:
             As `elevon.diagnose.learning.archive.write_archive`.
         """
         arrays: dict[str, npt.NDArray[Any]] = {}
+        trees: dict[str, npt.NDArray[Any]] = {}
         tests: dict[str, Any] = {}
         for name, test in self.tests.items():
             tests[name] = {"braked": test.braked, "travel": test.travel, "speed": test.speed}
@@ -221,12 +221,14 @@ class Surrogate:
                 key = f"{name}.{view}"
                 tests[name][view] = head.reach
                 arrays |= {f"{key}.{n}": a for n, a in _arrays(head).items()}
+                stored = head.ensemble.trees.arrays()
+                trees |= {f"{key}.{n}": a for n, a in stored.items()}
         values, index = packed(arrays)
         about = {
             "names": list(NAMES), "faults": list(FAULTS), "tests": tests, "arrays": index,
             "report": dict(self.report),
         }  # fmt: skip
-        return write_archive(path, KIND, about, values, force=force)
+        return write_archive(path, KIND, about, values | trees, force=force)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Surrogate:
@@ -249,7 +251,8 @@ class Surrogate:
 def _assembled(about: Mapping[str, Any], data: Mapping[str, Any]) -> Surrogate:
     if tuple(about["names"]) != NAMES or tuple(about["faults"]) != FAULTS:
         raise ValueError("features or faults of another version; train it anew")
-    arrays = unpacked(data, about["arrays"])
+    arrays: dict[str, Any] = {**unpacked(data, about["arrays"])}
+    arrays |= {name: a for name, a in data.items() if "." in name}
     tests = {}
     for name, item in about["tests"].items():
         heads = {
@@ -270,16 +273,16 @@ def _arrays(head: Head) -> dict[str, npt.NDArray[Any]]:
     out["named"] = np.nan_to_num(head.named, nan=-1.0).astype(np.float32)
     out["known"] = head.known.astype(np.float16)
     out["fold"] = head.fold.astype(np.float16)
-    return out | {f"layer{k}": w.astype(np.float16) for k, w in enumerate(head.ensemble.weights)}
+    return out | {"start": head.ensemble.start.astype(np.float32)}
 
 
-def _head(data: Mapping[str, Floats], key: str, reach: float) -> Head:
+def _head(data: Mapping[str, Any], key: str, reach: float) -> Head:
     arrays = {n.removeprefix(f"{key}."): a for n, a in data.items() if n.startswith(f"{key}.")}
     view = View.build(key.endswith("relative"), arrays)
     stored = {n: arrays[n] for n in _STORED}
     stored["named"] = np.where(arrays["named"] < 0.0, np.nan, arrays["named"])
-    layers = [arrays[f"layer{k}"] for k in range(sum(n.startswith("layer") for n in arrays))]
-    return Head(view=view, ensemble=Ensemble(layers), reach=reach, **stored)
+    ensemble = Ensemble(Trees.stored(arrays), arrays["start"])
+    return Head(view=view, ensemble=ensemble, reach=reach, **stored)
 
 
 @lru_cache(maxsize=1)

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.positions.features import FEATURES
+from elevon.diagnose.surrogate.boosted import Batch
 from elevon.diagnose.surrogate.features import NAMES
-from elevon.diagnose.surrogate.network import Batch
 from elevon.diagnose.surrogate.population import learned
 from elevon.diagnose.surrogate.table import TrainingTable
 from elevon.diagnose.surrogate.view import View, hidden
@@ -106,7 +106,7 @@ class Rows:
         hide: bool = False,
         most: int | None = None,
     ) -> Floats:
-        """Return the networks' inputs of rows; `most` baselines each at most."""
+        """Return the trees' inputs of rows; `most` baselines each at most."""
         values = self.values(rows, rng)
         if hide:
             values = hidden(values, rng)

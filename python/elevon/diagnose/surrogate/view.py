@@ -1,4 +1,4 @@
-"""What the networks are given: changes of the features against a healthy unit, made comparable.
+"""What the trees are given: changes of the features against a healthy unit, made comparable.
 
 The view ``relative`` holds them against baselines of the same unit, the view ``absolute`` against
 the middle of all healthy units that were trained.
@@ -65,7 +65,7 @@ class View:
         return np.nan_to_num((context - self.middle) / self.range)
 
     def inputs(self, values: Floats, healthy: Floats | None, count: Floats) -> Floats:
-        """Return what the networks are given, shape (n, m).
+        """Return what the trees are given, shape (n, m).
 
         `count`, shape (n,), is the number of baselines; the rest as for `change`.
         """
