@@ -170,8 +170,8 @@ def study_independent(
             rows[name] = judged
             if done is not None:
                 done.note(name, [], rows=[row.to_dict() for row in judged])
-    judged = tuple(row for name in calls for row in rows[name])
-    return IndependentResult(judged, plan, clock.perf_counter() - begin)
+    every = tuple(row for name in calls for row in rows[name])
+    return IndependentResult(every, plan, clock.perf_counter() - begin)
 
 
 @one_blas_thread()

@@ -122,10 +122,7 @@ def reproduce_gear(*, seed: int = 0, progress: Progress | None = None) -> GearRe
     lags = {name: [_lag(log, ratio) for log in some[-2:]] for name, some in logs.items()}
     lost = {name: [_between(log, ratio) for log in some[-2:]] for name, some in logs.items()}
     reference = logs[PLANETS][-1]
-    rows = [
-        GearRow(name, *_statics(some), *lost[name], _rms(some[-1], reference))
-        for name, some in logs.items()
-    ]  # fmt: skip
+    rows = [_row(name, some, lost[name], reference) for name, some in logs.items()]
     values = actuator.parameters.value
     count = 360.0 / (values("sensor.encoder.pulses") * values("sensor.encoder.edges")
                      * values("sensor.encoder.wheel_ratio"))  # fmt: skip
@@ -142,7 +139,10 @@ def variants(actuator: Actuator) -> dict[str, Actuator]:
     orbit = 1.0 / (1.0 + planets)
     spin = orbit * (1.0 - values("gear.fixed_ring_teeth") / values("gear.planet_teeth"))
     bodies = values("gear.inertia_1") * orbit**2 + values("gear.inertia_2") * spin**2
-    apart = {"gear.model": "wolfrom", "gear.inertia": values("gear.inertia") - bodies}
+    apart: dict[str, str | float] = {
+        "gear.model": "wolfrom",
+        "gear.inertia": values("gear.inertia") - bodies,
+    }
     return {
         LUMPED: actuator,
         ELASTIC: actuator.with_values({"backlash.model": "elastic"}),
@@ -196,6 +196,13 @@ def _runs(model: Actuator, seed: int) -> list[Run]:
         Run(model, moving, seed),
         Run(loaded, moving, seed),
     ]
+
+
+def _row(name: str, logs: list[Recording], lost: list[float], reference: Recording) -> GearRow:
+    """One model's answers: two pushes at rest, then two motions."""
+    still, stiffness = _statics(logs)
+    free, loaded = lost
+    return GearRow(name, still, stiffness, free, loaded, _rms(logs[-1], reference))
 
 
 def _statics(logs: list[Recording]) -> tuple[float, float | None]:
