@@ -200,9 +200,9 @@ def _runs(model: Actuator, seed: int) -> list[Run]:
 
 def _row(name: str, logs: list[Recording], lost: list[float], reference: Recording) -> GearRow:
     """One model's answers: two pushes at rest, then two motions."""
-    still, stiffness = _statics(logs)
+    lost_at_rest, stiffness = _statics(logs)
     free, loaded = lost
-    return GearRow(name, still, stiffness, free, loaded, _rms(logs[-1], reference))
+    return GearRow(name, lost_at_rest, stiffness, free, loaded, _rms(logs[-1], reference))
 
 
 def _statics(logs: list[Recording]) -> tuple[float, float | None]:
