@@ -166,10 +166,10 @@ def study_independent(
             n: [Judged.from_dict(r) for r in noted[n].data["rows"]] for n in calls if n in noted
         }
         left = {name: call for name, call in calls.items() if name not in rows}
-        for name, judged in side_by_side(left, processes=processes, progress=progress):
-            rows[name] = judged
+        for name, found in side_by_side(left, processes=processes, progress=progress):
+            rows[name] = found
             if done is not None:
-                done.note(name, [], rows=[row.to_dict() for row in judged])
+                done.note(name, [], rows=[row.to_dict() for row in found])
     every = tuple(row for name in calls for row in rows[name])
     return IndependentResult(every, plan, clock.perf_counter() - begin)
 
