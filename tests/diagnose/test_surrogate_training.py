@@ -80,7 +80,7 @@ def _table(units, rng, unlike=0.1):
 def test_calibration_holds_on_units_never_seen():
     rng = np.random.default_rng(3)
     tables = {"backlash": _table(40, rng)}
-    plan = TrainingPlan(folds=2, rounds=30, draws=20)
+    plan = TrainingPlan(folds=2, rounds=10, draws=20)
     result = fitted(tables, {}, plan, {})
     scores = judged(result, {"backlash": _table(40, rng)})["backlash.relative"]
     assert scores["covered"] / scores["severities"] > 0.82

@@ -18,7 +18,9 @@ STUDIES = (
     "foreign",
     "independent",
     "inspection-error",
+    "learned",
     "monitor-delay",
+    "monitor-hours",
     "next-test",
     "prognosis",
 )
