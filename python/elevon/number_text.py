@@ -72,6 +72,13 @@ def estimate_row(item: Estimate, actuator: Actuator, *more: str) -> tuple[str, .
     return (item.path, old, value, low, high, display, *more, ", ".join(item.given))
 
 
+def count_text(value: float, digits: int = 4) -> str:
+    """Return hours, flights or cycles as text: no power of ten below a million millions."""
+    if not 1e4 <= abs(value) < 1e12:
+        return f"{value:.{digits}g}"
+    return f"{float(f'{value:.{digits}g}'):,.0f}"
+
+
 def severity_texts(value: float, interval: tuple[float, float], unit: str) -> tuple[str, str, str]:
     """Return a severity and its interval as a person writes it: angles in deg, shares in %."""
     display = "%" if unit == "1" else display_unit(unit)

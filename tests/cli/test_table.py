@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from elevon.cli.table import table_lines
-from elevon.number_text import estimate_texts, interval_texts, severity_texts
+from elevon.number_text import count_text, estimate_texts, interval_texts, severity_texts
 
 HEADS = ["parameter", "before", "after", "low", "high", "unit", "register", "holds for"]
 ROWS = [
@@ -124,3 +124,8 @@ def _on_terminal(arguments, width):
         assert process.wait() == 0
     os.close(main)
     return b"".join(parts).decode().replace("\r\n", "\n")
+
+
+def test_counts_are_written_without_powers_of_ten():
+    texts = [count_text(x) for x in (0.0, 57.0, 1118.2, 9999.4, 353612.0, 3.2e12)]
+    assert texts == ["0", "57", "1118", "9999", "353,600", "3.2e+12"]

@@ -9,6 +9,7 @@ import tomlkit
 
 from elevon import Actuator, Scenario, simulate
 from elevon.errors import FormatError, InputError
+from elevon.number_text import count_text
 from elevon.prognose import LAWS, Inspection, Law, Mission, Seen, predict, respond
 from elevon.prognose.history import read_history, write_stamp
 from elevon.prognose.requirement import MEASURES, Requirement, RunSignals
@@ -90,7 +91,7 @@ def test_more_inspections_narrow_the_answer_and_too_few_say_how_wide_it_is(unit,
     assert widths[0] > widths[1] > 2.0 * widths[2]
     for result in (few, none):
         assert "3 are needed" in result.findings[0]
-        assert f"{result.interval[0]:.4g} to {result.interval[1]:.4g}" in result.findings[0]
+        assert " to ".join(map(count_text, result.interval)) in result.findings[0]
 
 
 def test_a_last_diagnosis_beyond_the_requirement_is_said_even_where_it_is_taken_as_stray(

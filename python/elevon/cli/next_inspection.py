@@ -10,6 +10,7 @@ import typer
 from elevon.cli import common
 from elevon.cli.output import answer, listed, print_table, progress_bar
 from elevon.cli.shell import Answer, command
+from elevon.number_text import count_text
 
 if TYPE_CHECKING:
     from elevon.prognose.next_inspection import NextInspection
@@ -50,4 +51,4 @@ def _print(result: NextInspection) -> None:
 
 
 def _use(value: float | None) -> str:
-    return "no end in sight" if value is None else f"{value:.4g}"
+    return "no end in sight" if value is None else count_text(value)

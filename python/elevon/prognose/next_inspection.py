@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from elevon.errors import RangeError
+from elevon.number_text import count_text
 from elevon.prognose.assumptions import Assumed
 from elevon.results import Result
 
@@ -66,8 +67,9 @@ class NextInspection(Result):
             return f"No end of life is in sight at a risk of {self.risk:.2g}; look at leisure{how}."
         if self.within <= 0.0:
             return f"Inspect now{how}: the risk that the unit has failed exceeds {self.risk:.2g}."
+        within = count_text(self.within)
         return (
-            f"Inspect within {self.within:.4g} {self.unit}{how}: until then the unit fails with a "
+            f"Inspect within {within} {self.unit}{how}: until then the unit fails with a "
             f"probability of at most {self.risk:.2g}."
         )
 

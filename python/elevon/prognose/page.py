@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from elevon.number_text import count_text
 from elevon.prognose.figures import course_figure, severity_unit, survival_figure
 from elevon.prognose.observation import Inspection
 from elevon.report import Report, ReportTable
@@ -33,12 +34,13 @@ def _remaining(result: Prognosis) -> str:
             return f"No end of life is in sight ({result.level:.0%} of the futures and more)."
         return (
             f"No end of life is in sight in more than half of the futures; the shortest "
-            f"{0.5 * (1.0 - result.level):.0%} end within {low:.4g} {result.unit}."
+            f"{0.5 * (1.0 - result.level):.0%} end within {count_text(low)} {result.unit}."
         )
     name, share = next(iter(result.first.items()))
-    upper = f"{high:.4g}" if np.isfinite(high) else "no end in sight"
+    upper = count_text(high) if np.isfinite(high) else "no end in sight"
+    median, lower = count_text(result.median), count_text(low)
     return (
-        f"{result.median:.4g} {result.unit} remain ({result.level:.0%}: {low:.4g} to {upper}); "
+        f"{median} {result.unit} remain ({result.level:.0%}: {lower} to {upper}); "
         f"{name} fails first in {share:.0%} of the futures."
     )
 
@@ -85,7 +87,7 @@ def _badge(result: Prognosis) -> tuple[str, Literal["pass", "fail", "open"]]:
         return "No end in sight", "pass"
     if result.median <= 0.0:
         return "Life has ended", "fail"
-    return f"{result.median:.3g} {result.unit} remain", "open"
+    return f"{count_text(result.median, 3)} {result.unit} remain", "open"
 
 
 def _assumed(report: Report, assumed: Sequence[Assumed], unit: str) -> None:
@@ -94,7 +96,7 @@ def _assumed(report: Report, assumed: Sequence[Assumed], unit: str) -> None:
     rows = [
         (
             a.name,
-            *("no end in sight" if v is None else f"{v:.4g}" for v in (a.median, a.low, a.high)),
+            *("no end in sight" if v is None else count_text(v) for v in (a.median, a.low, a.high)),
         )
         for a in assumed
     ]

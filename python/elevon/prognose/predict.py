@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.errors import InputError
+from elevon.number_text import count_text
 from elevon.prognose.answer import KnownFault, OffLaw, Prognosis, Reserve
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.growth import COUNT, GrowthFilter
@@ -273,9 +274,9 @@ def _thin(result: Prognosis, inspections: Sequence[Inspection]) -> list[str]:
         return []
     low, high = result.interval
     if np.isfinite(high):
-        wide = f"{low:.4g} to {high:.4g} {result.unit}"
+        wide = f"{count_text(low)} to {count_text(high)} {result.unit}"
     elif np.isfinite(low):
-        wide = f"{low:.4g} {result.unit} to no end in sight"
+        wide = f"{count_text(low)} {result.unit} to no end in sight"
     else:
         wide = "no end in sight"
     renewed = " since its part was made new" if any(item.reset for item in inspections) else ""
