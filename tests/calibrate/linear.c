@@ -39,6 +39,8 @@ struct linear {
     double count;              /* m */
     double delay;              /* samples of the drive between reading and acting */
     double start;              /* m */
+    double stiffness;          /* N/m between screw and mass; 0: rigid */
+    double joint_damping;      /* N s/m there */
 };
 
 enum { POSITION, SPEED, CURRENT, VOLTAGE, COLUMNS };
@@ -56,7 +58,9 @@ static double counted(double x, double count)
 
 int run(const struct linear *b, const double *command, double *rows)
 {
-    const double inertia = b->inertia + b->mass / (b->per_metre * b->per_metre);
+    const int elastic = b->stiffness > 0.0;
+    const double inertia = b->inertia + (elastic ? 0.0 : b->mass / (b->per_metre * b->per_metre));
+    double place = b->start, pace = 0.0; /* of an elastic mass */
     const long steps = (long)b->steps, every = (long)b->control_every, log_every = (long)b->log_every;
     const double tick = b->control_every * b->dt;
     double angle = b->start * b->per_metre, speed = 0.0, bristle = 0.0, current = 0.0, voltage = 0.0;
@@ -65,7 +69,7 @@ int run(const struct linear *b, const double *command, double *rows)
     long tick_number = 0, late = (long)b->delay;
     for (long k = 0; k < steps; k++) {
         if (k % every == 0) {
-            double shown = counted(angle / b->per_metre, b->count), error = command[tick_number] - shown, wanted;
+            double shown = counted(elastic ? place : angle / b->per_metre, b->count), error = command[tick_number] - shown, wanted;
             double share = b->filter > 0.0 ? tick / (b->filter + tick) : 1.0;
             if (b->cascade > 0.5) {
                 double measured = (shown - (tick_number ? before : shown)) / tick * b->per_metre;
@@ -101,12 +105,20 @@ int run(const struct linear *b, const double *command, double *rows)
         double dry = b->bristle * bristle + b->bristle_damping * rate * exp(-fabs(speed) / b->stribeck);
         bristle = bent;
         double drag = b->viscous * speed * (1.0 - b->bending * fabs(speed));
-        speed += b->dt * (torque - load - dry - drag) / inertia;
+        double link = load;
+        if (elastic) {
+            double force = b->stiffness * (angle / b->per_metre - place)
+                         + b->joint_damping * (speed / b->per_metre - pace);
+            pace += b->dt * (force - b->weight) / b->mass;
+            place += b->dt * pace;
+            link = force / b->per_metre;
+        }
+        speed += b->dt * (torque - link - dry - drag) / inertia;
         angle += b->dt * speed;
         if ((k + 1) % log_every == 0) {
             double *row = rows + ((k + 1) / log_every - 1) * COLUMNS;
-            row[POSITION] = angle / b->per_metre;
-            row[SPEED] = speed / b->per_metre;
+            row[POSITION] = elastic ? place : angle / b->per_metre;
+            row[SPEED] = elastic ? pace : speed / b->per_metre;
             row[CURRENT] = current;
             row[VOLTAGE] = voltage;
         }

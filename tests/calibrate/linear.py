@@ -54,6 +54,8 @@ class Linear:
     count: float = 5e-7
     delay: float = 1.0
     start: float = 0.0
+    stiffness: float = 0.0
+    joint_damping: float = 0.0
 
 
 @dataclass(frozen=True)
