@@ -1,8 +1,8 @@
 """A PID from position to current, logged at 100 Hz, is not taken for a cascade.
 
 Six drives that the model which is fitted does not make: a sampled controller that acts one or two
-milliseconds late, counts, a derivative with a filter or without, three gains, a mass on a link that
-gives way, friction on bristles that grows with the force.
+milliseconds late, counts, a derivative with a filter or without, three gains, a mass on a
+compliant link, friction on bristles that grows with the force.
 """
 
 import math
