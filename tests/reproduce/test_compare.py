@@ -107,6 +107,13 @@ def test_every_line_of_the_catalogue_is_in_the_default_table():
     }
 
 
+def test_the_default_table_leaves_out_what_changes_nothing():
+    from elevon.reproduce.fault_sensitivity import ROTARY_FAULTS, _default
+
+    chosen = _default(elevon.Actuator.load("torino-rotary"), None)
+    assert set(ROTARY_FAULTS) - set(chosen) == {"connector_open@supply=1"}
+
+
 def test_every_shipped_actuator_says_what_it_is_compared_on():
     from elevon.compare import compared_signals, default_scenario, default_start
     from elevon.compare_loads import load_size

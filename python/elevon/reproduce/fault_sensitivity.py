@@ -249,7 +249,12 @@ def _default(actuator: Actuator, faults: Sequence[str] | None) -> Sequence[str]:
         return faults
     if actuator.wiring != "rotary":
         raise InputError(f"faults: name them; there is no default list for {actuator.wiring!r}")
-    return ROTARY_FAULTS
+    from elevon.simulate.own_faults import own_faults
+
+    # One that changes nothing in this actuator is refused as a run.
+    acting = {(record.kind, place) for record in own_faults(actuator) for place in record.places}
+    parsed = {text: Fault.parse(text) for text in ROTARY_FAULTS}
+    return [text for text, fault in parsed.items() if (fault.kind, fault.place) in acting]
 
 
 def _strongest(
