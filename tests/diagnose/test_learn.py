@@ -90,6 +90,23 @@ def test_the_file_comes_back(learned, tmp_path):
         LearnedClasses.load(tmp_path / "other.npz")
 
 
+def test_a_file_cut_or_changed_anywhere_is_no_file(tmp_path):
+    whole = write_archive(tmp_path / "whole.npz", "classes", {}, {"x": np.arange(500.0)})
+    data = whole.read_bytes()
+    (tmp_path / "bad.npz").write_bytes(data[: len(data) // 2])
+    with pytest.raises(FormatError, match=r"bad\.npz"):
+        read_archive(tmp_path / "bad.npz")
+    for place in range(40, len(data) // 2, 7):  # within the packed arrays
+        (tmp_path / "bad.npz").write_bytes(
+            data[:place] + bytes([data[place] ^ 255]) + data[place + 1 :]
+        )
+        try:
+            _, _, arrays = read_archive(tmp_path / "bad.npz")
+        except FormatError:
+            continue
+        np.testing.assert_array_equal(arrays["x"], np.arange(500.0))
+
+
 def test_another_motion_is_refused(unit, labelled, learned):
     slow = bench_logs(unit, [(1, [])], procedure="chirp")[0]
     with pytest.raises(InputError, match="not of the motion"):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import tokenize
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,11 @@ from elevon.files import write_bytes
 
 FORMAT, _VERSION = "elevon-learned", 1
 _MOST_BYTES = 50_000_000
+#: What a damaged archive raises, its members' headers included: they are Python literals.
+_DAMAGED = (
+    OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, MemoryError, SyntaxError,
+    tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 def write_archive(
@@ -38,7 +45,7 @@ def write_archive(
     head = {"format": FORMAT, "version": _VERSION, "kind": kind, **about}
     text = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
     stream = io.BytesIO()
-    np.savez(stream, about=text, **arrays)  # type: ignore[arg-type]
+    np.savez_compressed(stream, about=text, **arrays)  # type: ignore[arg-type]
     return write_bytes(path, stream.getvalue(), force=force)
 
 
@@ -64,5 +71,5 @@ def read_archive(
         if about.get("format") != FORMAT or about.get("version") != _VERSION:
             raise ValueError(f"format {about.get('format')!r}, version {about.get('version')!r}")
         return str(about["kind"]), about, arrays
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
         raise FormatError(f"{path}: nothing that Elevon learnt: {error}") from error
