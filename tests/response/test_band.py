@@ -18,8 +18,9 @@ def synthetic(gain=1.0, delay=0.0, coherence=1.0, top=100.0):
     lines = np.arange(1.0, top + 1.0)
     share = np.full(lines.shape, coherence)
     return FrequencyResponse(
-        lines, gain * np.exp(-2j * np.pi * lines * delay), share, 0.0 * lines, "command",
-        "motor_speed", "1", "multisine", 1.0, 3,
+        frequency=lines, response=gain * np.exp(-2j * np.pi * lines * delay), coherence=share,
+        std=0.0 * lines, input="command", output="motor_speed", unit="1", method="multisine",
+        amplitude=1.0, realisations=3,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from elevon.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Hx711:
         """Force of one count [N]."""
         return 2.0 * self.full_scale / float(2**self.bits)
 
-    def convert(self, force: npt.ArrayLike) -> FloatArray:
+    def convert(self, force: npt.ArrayLike) -> Floats:
         """Return forces [N] as the converter reports them: in whole counts, clipped at its ends."""
         top = 2 ** (self.bits - 1)
         counts = np.clip(np.rint(np.asarray(force, dtype=np.float64) / self.step), -top, top - 1)

@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.estimate import quantile
 from elevon.estimate.covariance import numbered_strokes
 from elevon.estimate.residual import fit_residual
@@ -113,7 +112,7 @@ class _Positions:
     drivers: Sequence[Floats]
     outputs: Sequence[Floats]
     speeds: Sequence[Floats]
-    keeps: Sequence[npt.NDArray[np.bool_]]
+    keeps: Sequence[Bools]
     start: tuple[float, float]
 
     @classmethod
@@ -273,7 +272,7 @@ def _start(
     return max(down - up, 1e-7), 0.5 * (up + down)
 
 
-def _after_reversal(x: Floats, width: float) -> npt.NDArray[np.bool_]:
+def _after_reversal(x: Floats, width: float) -> Bools:
     """Samples after the gap has surely been crossed once: before, the start decides the output."""
     reach = np.maximum.accumulate(x) - np.minimum.accumulate(x)
     return np.asarray(reach > 1.5 * width, dtype=np.bool_)

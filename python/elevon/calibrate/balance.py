@@ -13,14 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.motion import SmoothedMotion, delayed, dilated, lagged, motion_of, smoothed
 from elevon.estimate.regression import Regression, huber, robust_cost, with_deviations
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _SLOW = 0.05  # of the highest speed: below it friction may stick
 _CLEARER = 0.2  # of the highest speed: the same, stricter
 _CLEAR = 0.01  # s around a reversal and a slow sample that are left out too

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # breakaways
 _MEDIAN = 1.2533  # deviation of a median over that of a mean
 _STUCK = 0.02  # s that the shaft stands still at least

@@ -6,7 +6,6 @@ import time as clock
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.calibrate.acceptance import shortened, undetermined, with_values
@@ -25,7 +24,6 @@ from elevon.parameters.records import record_of
 from elevon.progress import Progress, part
 from elevon.threads import one_blas_thread
 
-Bools = npt.NDArray[np.bool_]
 _RUN_IN = 1.0  # s at least before a log counts
 _RUNS = 0.35  # of the work: where model runs begin
 _SETTLED = 0.5  # s after the set point has left its limit for the first time

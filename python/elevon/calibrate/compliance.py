@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Floats, Ints
 from elevon.errors import InputError, RangeError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import huber, with_deviations
@@ -99,9 +99,7 @@ def calibrate_compliance(
     return ComplianceCalibration((stiffness, *others), misfit, outliers)
 
 
-def _check(
-    x: Floats, y: Floats, blocks: npt.NDArray[np.int64], groups: npt.NDArray[np.int64]
-) -> None:
+def _check(x: Floats, y: Floats, blocks: Ints, groups: Ints) -> None:
     if not x.shape == y.shape == blocks.shape == groups.shape or x.ndim != 1:
         raise InputError(
             f"compliance: {x.shape} torques, {y.shape} losses, {blocks.shape} weights, "

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
@@ -25,7 +24,6 @@ from elevon.parameters.relations import constant_is_tied, static_following
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 
-Bools = npt.NDArray[np.bool_]
 _ABSORBS = 0.02  # relative difference to the direct estimate that is worth a name
 _SIGMAS = 2.0  # deviations it must also exceed
 _ROUNDS = 12  # of the fit: the regressions start it close by

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.balance import torque_balance
 from elevon.calibrate.law import controller_law
 from elevon.calibrate.plant import controller_estimates, plant_estimates, torque_scale
@@ -21,7 +21,6 @@ from elevon.parameters.relations import static_following
 from elevon.plain import Plain, in_unit, key
 from elevon.progress import Progress
 
-Bools = npt.NDArray[np.bool_]
 _OFFSETS = ("sensor.current_offset",)
 _LAST = 0.25  # of a single log that is kept from the fit
 
@@ -99,5 +98,5 @@ def _errors(log: Log, values: dict[str, float], fitted: Actuator) -> HeldOut | N
     return HeldOut(log.name, "", *errors)
 
 
-def _rms(error: npt.NDArray[np.float64], mask: Bools) -> float:
+def _rms(error: Floats, mask: Bools) -> float:
     return float(np.sqrt(np.mean(error[mask] ** 2)))

@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats, Ints
 from elevon.errors import InputError
 from elevon.estimate import Free
-from elevon.estimate.covariance import Ints, block_covariance
+from elevon.estimate.covariance import block_covariance
 from elevon.plain import Plain, key
 
-Bools = npt.NDArray[np.bool_]
 _CORRELATED = 0.95
 _LOOSEST = 0.25  # relative deviation (or of ten meaningful changes) still worth freeing
 _HOPELESS = 1.0  # the same, above which a requested parameter is refused

@@ -16,16 +16,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.direct import saturated_speed
 from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, lagged, smoothed
 from elevon.estimate.covariance import Strokes
 from elevon.estimate.regression import Regression, huber, regressed
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _SETTLED = 0.25  # s around a saturated set point in which anti-windup may act
 _LEAST = 200  # samples
 _LOOP = 1.5e-3  # s: a current loop's lag that a measured current hides (200 Hz and faster)

@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.errors import Interrupted
 from elevon.estimate import Free
 from elevon.estimate.lanes import LaneChannel, Lanes
 from elevon.experiment import Experiment, Sensor, Variant, run_all
-from elevon.logs.log import Bools, Log
+from elevon.logs.log import Log
 
 
 class ModelRuns:

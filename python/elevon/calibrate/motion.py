@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _NOISE = 0.01  # of the acceleration's RMS that its noise may be
 _WIDEST = 0.02  # s, deviation of the smoothing kernel at most
 _REACH = 6.0  # deviations of the kernel kept

@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.calibrate.validation import Validation
 from elevon.errors import unknown
 from elevon.estimate import Estimate
@@ -31,7 +29,7 @@ class _Log(Protocol):
     def name(self) -> str: ...
 
     @property
-    def time(self) -> npt.NDArray[np.float64]: ...
+    def time(self) -> Floats: ...
 
     @property
     def period(self) -> float: ...

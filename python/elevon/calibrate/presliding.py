@@ -18,16 +18,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.motion import acceleration_of, delayed, kernel, lagged, motion_of, smoothed
 from elevon.estimate.covariance import block_covariance
 from elevon.estimate.regression import Regression
 from elevon.estimate.residual import fit_residual, robust_weights
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # reversals
 _MOST = 48  # reversals that are followed
 _FINE = 4  # steps of the bristles a sample

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.calibrate.breakaway import breakaway_torque, stuck_stretches
 from elevon.calibrate.motion import motion_of
@@ -20,7 +19,6 @@ from elevon.calibrate.presliding import presliding_friction, reversals, usable_l
 from elevon.estimate.regression import Regression
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _FEWEST = 4  # reversals with a standstill
 _STUCK = 0.02  # s of a standstill at least
 _SLOW = 0.1  # of the dry friction: what it gives the shaft in a sample is a speed near rest

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.kinematics import command_fit
 from elevon.errors import InputError, Interrupted, unknown
 from elevon.experiment import Experiment, Inputs
@@ -23,8 +22,6 @@ from elevon.plain import STORED, Plain, in_unit, key
 from elevon.progress import Progress
 from elevon.report import Report
 from elevon.results import Result
-
-Bools = npt.NDArray[np.bool_]
 
 #: Signals compared: name, unit.
 SIGNALS: dict[str, str] = {

@@ -15,11 +15,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Floats, Ints
 
-Ints = npt.NDArray[np.int64]
 #: Instants and speeds of one log's samples in their order, and the log's period.
 Strokes = tuple[Floats, Floats, float]
 _SHORTEST = 0.25  # s

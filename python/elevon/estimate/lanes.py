@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Floats, Ints
 from elevon.estimate.covariance import block_length, joined, memory
 from elevon.estimate.free import Free, bounds, inner, outer
 
@@ -166,12 +165,12 @@ class Lanes:
         residual = self.residual(x[None, :])[0]
         return Point(x, residual, self.cost(residual, x))
 
-    def blocks(self, residual: Floats) -> npt.NDArray[np.int64]:
+    def blocks(self, residual: Floats) -> Ints:
         """Number the blocks of all samples, shape (n,): of time, longer than a residual's memory.
 
         The channels of a log share its blocks.
         """
-        numbers: list[npt.NDArray[np.int64]] = []
+        numbers: list[Ints] = []
         for log in dict.fromkeys(item.log for item in self.channels):
             mine = [k for k, item in enumerate(self.channels) if item.log == log]
             period = self.channels[mine[0]].period

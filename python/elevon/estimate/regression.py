@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elevon.arrays import Floats
-from elevon.estimate.covariance import Ints, Strokes, block_covariance, numbered_strokes
+from elevon.arrays import Floats, Ints
+from elevon.estimate.covariance import Strokes, block_covariance, numbered_strokes
 from elevon.estimate.number import Estimate
 
 _HUBER = 1.345  # deviations beyond which a residual weighs less: 95 % efficient without outliers

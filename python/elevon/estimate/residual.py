@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Floats, Ints
 from elevon.estimate.covariance import Strokes, block_covariance, numbered_strokes
 from elevon.estimate.free import Free, bounds, inner, outer
 from elevon.estimate.number import Determined, Estimate
@@ -63,7 +62,7 @@ class ResidualFit:
 
     def covariance(
         self,
-        blocks: npt.NDArray[np.int64],
+        blocks: Ints,
         *,
         prior: Floats | None = None,
         counted: int | None = None,

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.logs.clocks.quality import clipped_share, stuck_spans
 from elevon.logs.command.reconstruct import SPEED_LIMIT
-from elevon.logs.formats.table import FloatArray
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
@@ -46,9 +46,7 @@ def examine_channels(recording: Recording, ratio: float | None, report: ImportRe
         _stuck(recording, ratio, report)
 
 
-def _constant(
-    name: str, data: FloatArray, values: Mapping[str, FloatArray], report: ImportReport
-) -> None:
+def _constant(name: str, data: Floats, values: Mapping[str, Floats], report: ImportReport) -> None:
     good = data[np.isfinite(data)]
     moved = any(
         np.nanmax(v) > np.nanmin(v)
@@ -62,7 +60,7 @@ def _constant(
             report.warn(name, "stuck", f"stands at {good[0]:.6g} through the whole log")
 
 
-def _clipping(name: str, data: FloatArray, report: ImportReport, *, limited: bool) -> None:
+def _clipping(name: str, data: Floats, report: ImportReport, *, limited: bool) -> None:
     shares = clipped_share(data)
     for share, value in zip(shares, (np.nanmin(data), np.nanmax(data)), strict=True):
         if share <= _CLIP_SHARE or value == 0.0:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.errors import InputError
-from elevon.logs.log import Bools, Log, bridged, per_log
+from elevon.logs.log import Log, bridged, per_log
 
 _LEAST_SAMPLES = 200
 _NEEDED = ("speed_ref", "motor_speed")

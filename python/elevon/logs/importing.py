@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import DamageError, FormatError, InputError, RangeError, VersionError
 from elevon.logs.channels import examine_channels
 from elevon.logs.clocks.loadcell_join import join_loadcell
@@ -19,7 +20,7 @@ from elevon.logs.command.note import CommandNote, read_command_note
 from elevon.logs.formats.detect import read_table
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.matlab import has_variable
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.agreement import check_agreement
 from elevon.logs.maps.assign import Assignment, assign_columns, rms_to_peak, settle_positions
 from elevon.logs.maps.column_map import ColumnMap, find_map, shipped_map
@@ -235,7 +236,7 @@ def gear_ratio_of(
 
 def _clock(
     table: RawTable, assigned: dict[str, Assignment], report: ImportReport
-) -> tuple[ClockQuality, FloatArray]:
+) -> tuple[ClockQuality, Floats]:
     base = assigned["time"]
     seconds = table.columns[base.column] * (base.factor or 1.0)
     quality = clock_quality(table.source, seconds)
@@ -289,7 +290,7 @@ def _build(
     table: RawTable,
     assigned: dict[str, Assignment],
     quality: ClockQuality,
-    time: FloatArray,
+    time: Floats,
     *,
     report: ImportReport,
 ) -> Recording:

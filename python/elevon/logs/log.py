@@ -14,14 +14,13 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.errors import InputError, did_you_mean
 from elevon.logs.brake import Brake, brake_of
 from elevon.logs.command.note import CommandNote
 from elevon.recording import Recording
 from elevon.recording.channel import Channel
 
-Bools = npt.NDArray[np.bool_]
 Value = TypeVar("Value")
 Arguments = ParamSpec("Arguments")
 #: Roles by whose channel the clock is chosen, where no other is named.

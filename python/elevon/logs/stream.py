@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, InputError, did_you_mean, quoted
 from elevon.logs.command.note import CommandNote
 from elevon.logs.formats.limits import DEFAULT_LIMITS
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.formats.text import LineReader, named_columns
 from elevon.logs.importing import gear_ratio_of, settle_currents
 from elevon.logs.maps.assign import Assignment, assign_columns
@@ -48,7 +49,7 @@ class StreamPart:
         What the caller should know of the stream so far, each once.
     """
 
-    samples: Mapping[str, FloatArray]
+    samples: Mapping[str, Floats]
     unreadable: int = 0
     why: str = ""
     new_day: bool = False
@@ -235,7 +236,7 @@ class _Table(_Lines):
             _check_size(value, number)
         return row
 
-    def samples(self, rows: Sequence[Sequence[float]]) -> dict[str, FloatArray]:
+    def samples(self, rows: Sequence[Sequence[float]]) -> dict[str, Floats]:
         """Return rows by role."""
         data = np.array(rows).reshape(len(rows), len(self._names))
         table = RawTable(SOURCE, *named_columns(self._names, data))
@@ -291,7 +292,7 @@ class _Json(_Lines):
                 self._extra.add(key)
                 self._notes.append(f"{quoted(key)} is not read{did_you_mean(key, known)}")
 
-    def samples(self, rows: Sequence[Sequence[float]]) -> dict[str, FloatArray]:
+    def samples(self, rows: Sequence[Sequence[float]]) -> dict[str, Floats]:
         """Return rows by role."""
         data = np.array(rows).reshape(len(rows), len(self._keys))
         return {key: data[:, k].copy() for k, key in enumerate(self._keys)}

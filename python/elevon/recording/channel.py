@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, UnitError
 from elevon.recording.clock import Clock, frozen
 from elevon.recording.names import check_name
@@ -41,7 +41,7 @@ class Channel:
 
     name: str
     unit: str
-    values: npt.NDArray[np.float64]
+    values: Floats
     clock: Clock
     text: str = ""
 
@@ -60,7 +60,7 @@ class Channel:
         fields["values"], fields["clock"] = vector, clock
 
     @property
-    def time(self) -> npt.NDArray[np.float64]:
+    def time(self) -> Floats:
         """Instants of the samples in s, shape (n,), read-only."""
         return self.clock.time
 
@@ -70,7 +70,7 @@ class Channel:
     def __repr__(self) -> str:
         return f"Channel({self.name!r}, {self.unit!r}, {len(self)} samples on {self.clock.name!r})"
 
-    def to(self, unit: str) -> npt.NDArray[np.float64]:
+    def to(self, unit: str) -> Floats:
         """Return the values in another unit of the same kind, shape (n,).
 
         Raises

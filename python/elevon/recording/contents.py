@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from elevon.arrays import Floats
 from elevon.errors import DamageError, FormatError, InputError
 from elevon.recording.channel import Channel
 from elevon.recording.clock import Clock
@@ -47,7 +45,7 @@ def header_bytes(header: Header) -> int:
 
 def rebuild(
     header: Header,
-    columns: Callable[[str], Mapping[str, npt.NDArray[np.float64]]],
+    columns: Callable[[str], Mapping[str, Floats]],
     place: str,
 ) -> Contents:
     """Return the contents that a header and its columns describe.

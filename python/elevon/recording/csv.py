@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import DamageError, FormatError, InputError, UncheckedWarning
 from elevon.files import atomic_path, check_output, journal, publish
 from elevon.recording.channel import in_si
@@ -169,7 +169,7 @@ def _write(recording: Recording, path: Path) -> None:
             _write_arrow(columns, heads, stream)
 
 
-def _write_arrow(columns: list[npt.NDArray[np.float64]], heads: list[str], stream: Any) -> None:
+def _write_arrow(columns: list[Floats], heads: list[str], stream: Any) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
@@ -177,7 +177,7 @@ def _write_arrow(columns: list[npt.NDArray[np.float64]], heads: list[str], strea
     csv.write_csv(table, stream, csv.WriteOptions(include_header=False, quoting_style="none"))
 
 
-def _write_plain(columns: list[npt.NDArray[np.float64]], stream: Any) -> None:
+def _write_plain(columns: list[Floats], stream: Any) -> None:
     """Write without pyarrow: Python's own shortest text of a number, which gives back every bit."""
     for row in zip(*(column.tolist() for column in columns), strict=True):
         stream.write(f"{','.join(map(repr, row))}\n".encode())
@@ -302,7 +302,7 @@ def _heads(path: Path, line: str) -> dict[str, str]:
     return columns
 
 
-def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, Floats]:
     body = stream.read()
     if not body.strip():
         return {name: np.empty(0) for name in names}
@@ -310,7 +310,7 @@ def _numbers(path: Path, stream: Any, names: list[str]) -> dict[str, npt.NDArray
     return read(path, body, names)
 
 
-def _read_plain(path: Path, body: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+def _read_plain(path: Path, body: bytes, names: list[str]) -> dict[str, Floats]:
     """Read without pyarrow: strictly numbers with commas between them, one row a line."""
     rows = [line.split(b",") for line in body.splitlines() if line.strip()]
     wrong = next((k for k, row in enumerate(rows) if len(row) != len(names)), None)
@@ -325,7 +325,7 @@ def _read_plain(path: Path, body: bytes, names: list[str]) -> dict[str, npt.NDAr
     return {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
 
 
-def _read_arrow(path: Path, body: bytes, names: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+def _read_arrow(path: Path, body: bytes, names: list[str]) -> dict[str, Floats]:
     import pyarrow as pa
     from pyarrow import csv
 
@@ -342,9 +342,7 @@ def _read_arrow(path: Path, body: bytes, names: list[str]) -> dict[str, npt.NDAr
     return {name: table.column(name).to_numpy() for name in names}
 
 
-def _undescribed(
-    path: Path, columns: dict[str, str], arrays: dict[str, npt.NDArray[np.float64]]
-) -> Contents:
+def _undescribed(path: Path, columns: dict[str, str], arrays: dict[str, Floats]) -> Contents:
     try:
         values = {name: arrays[name] for name in columns if name != "time"}
         units = {name: unit for name, unit in columns.items() if name != "time"}

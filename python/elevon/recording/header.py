@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import DamageError, FormatError, InputError, VersionError
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Header:
         ]
         return replace(header, sha256=header.digest(arrays))
 
-    def digest(self, arrays: "Iterable[npt.NDArray[np.float64]]") -> str:
+    def digest(self, arrays: "Iterable[Floats]") -> str:
         """Return the SHA-256 of this description and of times and values, clock by clock.
 
         Every NaN counts as the plain one: text knows no other.

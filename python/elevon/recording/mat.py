@@ -12,9 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
+from elevon.arrays import Floats
 from elevon.containers.mat5 import Variable, variables
 from elevon.errors import FormatError, InputError
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
@@ -24,8 +22,7 @@ from elevon.recording.names import check_name
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-_Array = npt.NDArray[np.float64]
-_Value = _Array | str | dict[str, _Array]
+_Value = Floats | str | dict[str, Floats]
 
 _LIMIT = 2**31 - 1
 _TEXT = b"MATLAB 5.0 MAT-file, written by Elevon"
@@ -103,7 +100,7 @@ def _is_real(variable: Variable) -> bool:
     return variable.kind == "numbers" and not variable.is_complex
 
 
-def _struct(path: Path, content: dict[str, _Value], name: str) -> dict[str, _Array]:
+def _struct(path: Path, content: dict[str, _Value], name: str) -> dict[str, Floats]:
     """Return the vectors of one clock's struct."""
     value = content.get(name)
     if not isinstance(value, dict):

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.containers.hdf import dataset, opened, vector
 from elevon.errors import FormatError
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
@@ -66,7 +67,7 @@ def read(path: Path, max_bytes: int) -> Contents:
         check_size(str(path), header_bytes(header), max_bytes)
         several = len(header.clocks) > 1
 
-        def columns(name: str) -> dict[str, npt.NDArray[np.float64]]:
+        def columns(name: str) -> dict[str, Floats]:
             entry = next(clock for clock in header.clocks if clock.name == name)
             time = f"time_{name}" if several else "time"
             arrays = {"time": _vector(path, file, time, "f", max_bytes)}
@@ -81,7 +82,7 @@ def _variable(
     file: Any,
     name: str,
     dimension: str,
-    values: npt.NDArray[np.float64],
+    values: Floats,
     attributes: dict[str, Any],
 ) -> None:
     packing: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}

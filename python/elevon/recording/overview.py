@@ -8,9 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.recording.states import code_names
 from elevon.units import display_unit, format_quantity, to_display
 
@@ -225,7 +224,7 @@ def _states(channel: Channel, names: dict[int, str]) -> Iterator[Band]:
             yield Band(float(channel.time[first]), float(end), name, "state")
 
 
-def _stretches(there: npt.NDArray[np.bool_], time: Floats) -> Iterator[tuple[float, float]]:
+def _stretches(there: Bools, time: Floats) -> Iterator[tuple[float, float]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         yield float(time[first]), float(time[min(last, time.size - 1)])

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.containers.parquet import columns, declared_bytes, opened
 from elevon.errors import FormatError
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
@@ -119,7 +119,7 @@ def _row_groups(path: Path, file: Any, header: Header) -> dict[str, list[int]]:
 
 def _columns(
     path: Path, file: Any, header: Header, name: str, groups: dict[str, list[int]]
-) -> dict[str, npt.NDArray[np.float64]]:
+) -> dict[str, Floats]:
     import pyarrow as pa
 
     entry = next(clock for clock in header.clocks if clock.name == name)

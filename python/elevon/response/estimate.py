@@ -3,61 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
-from elevon.plain import STORED, in_unit, key
+from elevon.arrays import Complex, Floats
 from elevon.response.band import AgreementBand
+from elevon.response.bode import BodeLines, zero_between
 from elevon.response.linear import LinearModel
-from elevon.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Complex = npt.NDArray[np.complex128]
 
-
-@dataclass(frozen=True)
-class FrequencyResponse(Result):
+@dataclass(frozen=True, kw_only=True)
+class FrequencyResponse(BodeLines):
     """What a sine of each frequency becomes.
 
     Attributes
     ----------
-    frequency : ndarray, shape (n,)
-        Hz.
-    response : ndarray of complex, shape (n,)
-        Output over input, in `unit`.
-    coherence : ndarray, shape (n,)
-        Share of the output's power that is linear in the input, 0 to 1: noise and nonlinearity
-        (backlash, friction, limits) take the rest.
-    std : ndarray, shape (n,)
-        Relative standard deviation of the gain, and of the phase in rad; NaN of one realisation.
     input, output : str
-        Signals.
+        Signals; the response is the output over the input, in `unit`.
     unit : str
         Of the gain; ``1`` when both have one unit.
     method : str
         ``multisine`` or ``sweep``.
-    amplitude : float
-        Greatest value of the input about its mean, SI.
-    realisations : int
-        Independent inputs the figures stand on.
     """
 
-    frequency: Annotated[Floats, key("frequency_hz"), in_unit("Hz")]
-    response: Annotated[Complex, STORED]
-    coherence: Floats
-    std: Annotated[Floats, key("gain_relative_std")]
     input: str
     output: str
     unit: str
     method: str
-    amplitude: float
-    realisations: int
-    actuator: str = ""
     linear: LinearModel | None = None
     band: AgreementBand | None = None
 
@@ -71,7 +47,6 @@ class FrequencyResponse(Result):
         "lag_90_hz=lag_90",
     )
     TABLE: ClassVar = "lines"
-    status: ClassVar = "ok"
 
     @property
     def headline(self) -> str:
@@ -81,16 +56,6 @@ class FrequencyResponse(Result):
             for text, value in (("gain -3 dB", self.bandwidth), ("phase -90 deg", self.lag_90))
         ]
         return f"{self.input} to {self.output} of {self.actuator}: {', '.join(reached)}."
-
-    @property
-    def gain_db(self) -> Floats:
-        """Gain in decibels, shape (n,)."""
-        return np.asarray(20.0 * np.log10(self.gain))
-
-    @property
-    def phase_deg(self) -> Floats:
-        """Phase in degrees, unwrapped, shape (n,)."""
-        return np.asarray(np.rad2deg(self.phase))
 
     @property
     def bandwidth(self) -> float | None:
@@ -112,16 +77,6 @@ class FrequencyResponse(Result):
         rows = zip(*(values.tolist() for values in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in rows]
 
-    @property
-    def gain(self) -> Floats:
-        """Gain in `unit`, shape (n,)."""
-        return np.abs(self.response)
-
-    @property
-    def phase(self) -> Floats:
-        """Phase in rad, unwrapped from the lowest frequency on, shape (n,)."""
-        return np.unwrap(np.angle(self.response))
-
     def crossing(self, drop_db: float = 3.0) -> float | None:
         """Return the frequency in Hz at which the gain has fallen by `drop_db` for good, or None.
 
@@ -132,27 +87,19 @@ class FrequencyResponse(Result):
         last = int(above[-1])
         if last == len(level) - 1:
             return None
-        return self._between(last, level)
+        return zero_between(self.frequency, level, last)
 
     def lag(self, degrees: float = 90.0) -> float | None:
         """Return the frequency in Hz at which the phase first lags by `degrees`, or None."""
         level = np.rad2deg(self.phase) + degrees
         below = np.flatnonzero(level < 0.0)
-        return None if not below.size or below[0] == 0 else self._between(int(below[0]) - 1, level)
-
-    def _between(self, at: int, level: Floats) -> float:
-        low, high = np.log(self.frequency[at : at + 2])
-        share = level[at] / (level[at] - level[at + 1])
-        return float(np.exp(low + share * (high - low)))
+        if not below.size or below[0] == 0:
+            return None
+        return zero_between(self.frequency, level, int(below[0]) - 1)
 
     def plot(self) -> Figure:
         """Return a Bode plot: gain, phase, coherence over frequency."""
-        from elevon.response.bode import bode_plot
-
-        return bode_plot(
-            self.frequency, self.response, self.std, self.coherence,
-            title=f"{self.input} to {self.output}, {self.method}", unit=self.unit,
-        )  # fmt: skip
+        return self.bode(f"{self.input} to {self.output}, {self.method}", self.unit)
 
 
 def estimate(inputs: Complex, outputs: Complex) -> tuple[Complex, Floats, Floats]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Complex, Floats
 from elevon.errors import InputError
 from elevon.plain import STORED, in_unit, key
 from elevon.results import Result
@@ -20,7 +20,6 @@ from elevon.units import parse_quantity
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
 
-Complex = npt.NDArray[np.complex128]
 _SMALLEST = 1e-4  # of the largest singular value: below it stands what is not linear
 
 
@@ -145,17 +144,12 @@ def linearise(
     InputError
         No such port or signal, nothing that answers, a horizon of fewer than four periods.
     """
-    session = Session(actuator, mode=mode, fidelity="low", signals=outputs)
     step = parse_quantity(period, "s", "period")
     count = round(parse_quantity(horizon, "s", "horizon") / step)
     if count < 4:
         raise InputError(f"horizon = {horizon} is shorter than four periods ({step:g} s)")
-    unit = session.unit("command")
-    at = {"command": parse_quantity(command, unit or "1", "command")}
-    if load:
-        at["output"] = parse_quantity(load, session.unit("output"), "load")
-    session.set(**at)
-    session.advance(round(parse_quantity(settle, "s", "settle") / session.step) * session.step)
+    session = Session(actuator, mode=mode, fidelity="low", signals=outputs)
+    at = _settled(session, command, load, settle)
     markov, half = (
         np.stack([_impulse(session, name, at, outputs, (step, count, h)) for name in inputs], 2)
         for h in (pulse, 0.5 * pulse)
@@ -167,18 +161,22 @@ def linearise(
         )
     a, b, c, values = _realised(markov, order)
     return LinearModel(
-        a=a,
-        b=b,
-        c=c,
-        d=markov[0],
-        period=step,
-        inputs=tuple(inputs),
-        outputs=tuple(outputs),
-        point=session.read(*outputs),
-        singular_values=values,
+        a, b, c, markov[0], step, tuple(inputs), tuple(outputs), session.read(*outputs), values,
         error=_error(markov, a, b, c),
         nonlinearity=float(np.sqrt(np.sum((half - markov) ** 2) / np.sum(markov**2))),
-    )
+    )  # fmt: skip
+
+
+def _settled(
+    session: Session, command: float | str, load: float | str, settle: float | str
+) -> dict[str, float]:
+    """Bring a session to its operating point; return the inputs there."""
+    at = {"command": parse_quantity(command, session.unit("command") or "1", "command")}
+    if load:
+        at["output"] = parse_quantity(load, session.unit("output"), "load")
+    session.set(**at)
+    session.advance(round(parse_quantity(settle, "s", "settle") / session.step) * session.step)
+    return at
 
 
 def _impulse(

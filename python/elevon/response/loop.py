@@ -10,21 +10,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Complex, Floats
 from elevon.errors import InputError, unknown
-from elevon.plain import STORED, in_unit, key
 from elevon.progress import Progress
+from elevon.response.bode import BodeLines
 from elevon.response.margins import Margin, Margins, margins
-from elevon.response.measure import Multisine, frequencies, require_finished, scenario_of
-from elevon.results import Result
-from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
+from elevon.response.measure import Excitation, Multisine, frequencies
+from elevon.simulate import check_fidelity, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
-from elevon.units import display_unit, parse_quantity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +29,6 @@ if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.recording import Recording
 
-Complex = npt.NDArray[np.complex128]
 LOOPS = ("position", "speed", "current")
 _LINES = 60  # some twenty in a decade: the phase turns little between two
 _COHERENT = 0.95  # below it a loop's margins are those of something else than its linear part
@@ -41,45 +37,25 @@ _SIZE = {"position": ("1 deg", "1 mm"), "speed": ("200 rpm",) * 2, "current": ("
 _SAMPLES = 20
 
 
-@dataclass(frozen=True)
-class LoopResponse(Result):
+@dataclass(frozen=True, kw_only=True)
+class LoopResponse(BodeLines):
     """The open loop at each line.
 
     Attributes
     ----------
     loop : str
         ``position``, ``speed`` or ``current``.
-    frequency : ndarray, shape (n,)
-        Hz.
-    response : ndarray of complex, shape (n,)
-        Feedback over error.
-    coherence : ndarray, shape (n,)
-        Share of the feedback's power that is linear in the command, 0 to 1.
-    std : ndarray, shape (n,)
-        Relative standard deviation of the gain, and of the phase in rad; NaN of one realisation.
     command, feedback : str
-        Signals compared.
-    amplitude : float
-        Greatest value of the command about its mean, SI.
-    realisations : int
-        Independent inputs the figures stand on.
+        Signals compared; the response is the feedback over the error.
     """
 
     loop: str
-    frequency: Annotated[Floats, key("frequency_hz"), in_unit("Hz")]
-    response: Annotated[Complex, STORED]
-    coherence: Floats
-    std: Annotated[Floats, key("gain_relative_std")]
     command: str
     feedback: str
-    amplitude: float
-    realisations: int
-    actuator: str = ""
 
     KIND: ClassVar = "loop-response"
     COMPUTED: ClassVar = ("status", "gain_db", "phase_deg", "margins", "hint")
     TABLE: ClassVar = "margins_table"
-    status: ClassVar = "ok"
 
     @property
     def margins_table(self) -> dict[str, Margin]:
@@ -100,16 +76,6 @@ class LoopResponse(Result):
             for name, margin in self.margins_table.items()
         ]
         return f"{self.loop} loop of {self.actuator}: {', '.join(parts)}."
-
-    @property
-    def gain_db(self) -> Floats:
-        """Gain in decibels, shape (n,)."""
-        return np.asarray(20.0 * np.log10(np.abs(self.response)))
-
-    @property
-    def phase_deg(self) -> Floats:
-        """Phase in degrees, unwrapped, shape (n,)."""
-        return np.asarray(np.rad2deg(np.unwrap(np.angle(self.response))))
 
     @cached_property
     def margins(self) -> Margins:
@@ -137,11 +103,7 @@ class LoopResponse(Result):
 
     def plot(self) -> Figure:
         """Return a Bode plot: gain, phase, coherence over frequency."""
-        from elevon.response.bode import bode_plot
-
-        return bode_plot(
-            self.frequency, self.response, self.std, self.coherence, title=f"{self.loop} loop"
-        )
+        return self.bode(f"{self.loop} loop")
 
 
 def loop_response(
@@ -181,36 +143,24 @@ def loop_response(
         No such loop in this actuator or drive, an empty range, a run that tripped or diverged.
     """
     loaded = _checked(as_actuator(actuator), loop, fidelity)
-    if realisations < 1:
-        raise InputError(f"realisations = {realisations} must be at least 1")
+    unit, given = _excited(loaded, loop, amplitude)
+    excitation = Excitation(
+        loaded, "torque" if loop == "current" else loop, unit, given, bias, load,
+        realisations=realisations, fidelity=fidelity, seed=seed,
+    )  # fmt: skip
     step = solver_step(loaded, fidelity)
     first, last = frequencies(
         _RANGE[loop][0] if low is None else low,
         min(_RANGE[loop][1], 0.999 / (_SAMPLES * step)) if high is None else high,
     )
-    mode = "torque" if loop == "current" else loop
-    command, feedback, factor = _signals(loaded, loop)
-    unit, size = _amplitude(loaded, loop, amplitude)
-    mean = parse_quantity(bias, unit, "bias", display_unit(unit))
     design = Multisine(first, last, step, lines=_LINES, falling=loop != "current")
-    generator = np.random.default_rng(seed)
-    runs = []
-    for number in range(realisations):
-        terms = [*design.terms(size, generator), {"kind": "constant", "value": mean}]
-        runs.append(
-            Run(loaded, scenario_of(design.duration, mode, terms, load), seed, number=number)
-        )
-    recordings = simulate_batch(
-        runs,
-        fidelity=fidelity,
-        record=f"{command},{feedback}@{design.rate!r} Hz",
-        progress=progress,
-    )
-    require_finished(recordings)
+    command, feedback, factor = _signals(loaded, loop)
+    recordings = excitation.recordings(design, f"{command},{feedback}", progress)
     response, coherence, std = _ratio(design, recordings, (command, feedback, factor))
     return LoopResponse(
-        loop, design.frequency, response, coherence, std, command, feedback, size, realisations
-    )
+        loop=loop, frequency=design.frequency, response=response, coherence=coherence, std=std,
+        command=command, feedback=feedback, amplitude=excitation.size, realisations=realisations,
+    )  # fmt: skip
 
 
 def _checked(actuator: Actuator, loop: str, fidelity: str) -> Actuator:
@@ -251,16 +201,14 @@ def _signals(actuator: Actuator, loop: str) -> tuple[str, str, float]:
     return "command", "resolver_position", lead / value("gear.ratio")
 
 
-def _amplitude(actuator: Actuator, loop: str, amplitude: float | str | None) -> tuple[str, float]:
+def _excited(
+    actuator: Actuator, loop: str, amplitude: float | str | None
+) -> tuple[str, float | str]:
     from elevon.scenario.compile import signal_units
 
     place = signal_units(actuator.wiring, "high")["output_position"]
     unit = {"position": place, "speed": "rad/s", "current": "N m"}[loop]
-    given = _SIZE[loop][place == "m"] if amplitude is None else amplitude
-    size = parse_quantity(given, unit, "amplitude", display_unit(unit))
-    if not size > 0.0:
-        raise InputError(f"amplitude = {amplitude} must be positive")
-    return unit, size
+    return unit, _SIZE[loop][place == "m"] if amplitude is None else amplitude
 
 
 def _ratio(

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Complex, Floats
 from elevon.plain import Plain, in_unit, key
+from elevon.response.bode import zero_between
 
-Complex = npt.NDArray[np.complex128]
 LEVEL = 0.90
 _DRAWS = 400  # of the loop within its deviation: the ends of an interval to a twentieth of it
 _FINE = 40  # points between two lines, where the loop is interpolated
@@ -116,7 +115,7 @@ def _crossover(frequency: Floats, loop: Complex) -> _Point:
     above = np.flatnonzero(level >= 0.0)
     if not above.size or above[-1] == len(level) - 1:
         return None
-    at = _zero(frequency, level, int(above[-1]))
+    at = zero_between(frequency, level, int(above[-1]))
     return at, at
 
 
@@ -134,7 +133,7 @@ def _gain(frequency: Floats, loop: Complex) -> _Point:
     gain = np.log(np.abs(loop))
     rows = []
     for at in np.flatnonzero((beyond[:-1] >= 0.0) & (beyond[1:] < 0.0)):
-        where = _zero(frequency, beyond, int(at))
+        where = zero_between(frequency, beyond, int(at))
         level = float(np.interp(np.log(where), np.log(frequency), gain))
         if level < 0.0:
             rows.append((float(-20.0 / np.log(10.0)) * level, where))
@@ -158,10 +157,3 @@ def _turned(loop: Complex) -> Floats:
     phase = np.unwrap(np.angle(loop))
     first = np.ceil((phase[0] - np.pi / 2.0) / (2.0 * np.pi))
     return np.asarray(phase - 2.0 * np.pi * first)
-
-
-def _zero(frequency: Floats, values: Floats, at: int) -> float:
-    """Return where values pass zero behind a line, linear over the logarithm of the frequency."""
-    low, high = np.log(frequency[at : at + 2])
-    share = values[at] / (values[at] - values[at + 1])
-    return float(np.exp(low + share * (high - low)))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import InputError, unknown
 from elevon.progress import Progress
@@ -17,7 +19,7 @@ from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
 from elevon.simulate.arguments import ActuatorLike, as_actuator
 from elevon.units import display_unit, parse_quantity
 
-METHODS = ("multisine", "sweep")
+_UNITS = {"position": "", "speed": "rad/s", "torque": "N m"}  # of the command; "": the output's
 _MOST = 24  # lines of a multisine: about ten in a decade are read well from a plot
 _PERIODS = 2  # measured, after one in which the transient dies
 _WIDEST = 1e4  # highest frequency over lowest: a period of the one is sampled for the other
@@ -82,53 +84,80 @@ def frequency_response(
         An empty range, a frequency above what the solver resolves, an unknown method or signal, a
         run that tripped or diverged.
     """
-    unit_of_command = {"position": "", "speed": "rad/s", "torque": "N m"}
     loaded = as_actuator(actuator)
     check_fidelity(loaded.wiring, fidelity)
-    if method not in METHODS:
-        raise unknown("method", method, METHODS)
-    if mode not in unit_of_command:
-        raise unknown("mode", mode, unit_of_command)
     units = signal_units(loaded.wiring, fidelity)
-    if output not in units:
-        raise unknown("signal", output, units, "output")
-    unit = unit_of_command[mode] or units["output_position"]
-    first, last = frequencies(low, high)
-    size = parse_quantity(amplitude, unit, "amplitude", display_unit(unit))
-    if not size > 0.0:
-        raise InputError(f"amplitude = {amplitude} must be positive")
-    if realisations < 1:
-        raise InputError(f"realisations = {realisations} must be at least 1")
-    design = (Multisine if method == "multisine" else _Sweep)(
-        first, last, solver_step(loaded, fidelity)
-    )
-    mean = parse_quantity(bias, unit, "bias", display_unit(unit))
-    generator = np.random.default_rng(seed)
-    runs = []
-    for number in range(realisations):
-        terms = [*design.terms(size, generator), {"kind": "constant", "value": mean}]
-        runs.append(
-            Run(loaded, scenario_of(design.duration, mode, terms, load), seed, number=number)
-        )
-    record = f"command,{output}@{design.rate!r} Hz"
-    recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
-    require_finished(recordings)
-    spectra = [design.spectra(item, output, mean) for item in recordings]
-    response, coherence, std = estimate(
-        np.concatenate([item[0] for item in spectra]), np.concatenate([item[1] for item in spectra])
-    )
+    for what, name, known, place in (
+        ("method", method, _DESIGNS, ""), ("mode", mode, _UNITS, ""),
+        ("signal", output, units, "output"),
+    ):  # fmt: skip
+        if name not in known:
+            raise unknown(what, name, known, place)
+    unit = _UNITS[mode] or units["output_position"]
+    excitation = Excitation(
+        loaded, mode, unit, amplitude, bias, load, realisations=realisations, fidelity=fidelity,
+        seed=seed,
+    )  # fmt: skip
+    design = _DESIGNS[method](*frequencies(low, high), solver_step(loaded, fidelity))
+    recordings = excitation.recordings(design, f"command,{output}", progress)
+    spectra = [design.spectra(item, output, excitation.mean) for item in recordings]
+    response, coherence, std = estimate(*map(np.concatenate, zip(*spectra, strict=True)))
     return FrequencyResponse(
-        frequency=design.frequency,
-        response=response,
-        coherence=coherence,
-        std=std,
-        input="command",
-        output=output,
+        frequency=design.frequency, response=response, coherence=coherence, std=std,
+        input="command", output=output, method=method,
         unit="1" if units[output] == unit else f"{units[output]} / ({unit})",
-        method=method,
-        amplitude=size,
-        realisations=realisations,
-    )
+        amplitude=excitation.size, realisations=realisations,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """How an actuator is excited: its fields are what `frequency_response` takes, and the unit."""
+
+    actuator: Actuator
+    mode: str
+    unit: str
+    amplitude: float | str
+    bias: float | str
+    load: float | str
+    realisations: int
+    fidelity: str
+    seed: int
+
+    def __post_init__(self) -> None:
+        if not self.size > 0.0:
+            raise InputError(f"amplitude = {self.amplitude} must be positive")
+        if self.realisations < 1:
+            raise InputError(f"realisations = {self.realisations} must be at least 1")
+
+    @property
+    def size(self) -> float:
+        """Greatest value of the command about its mean, SI."""
+        return parse_quantity(self.amplitude, self.unit, "amplitude", display_unit(self.unit))
+
+    @property
+    def mean(self) -> float:
+        """Of the command, SI."""
+        return parse_quantity(self.bias, self.unit, "bias", display_unit(self.unit))
+
+    def recordings(
+        self, design: Multisine | _Sweep, signals: str, progress: Progress | None
+    ) -> list[Recording]:
+        """Return a run for each realisation; `InputError` where one did not go to its end."""
+        generator = np.random.default_rng(self.seed)
+        runs = []
+        for number in range(self.realisations):
+            terms = [*design.terms(self.size, generator), {"kind": "constant", "value": self.mean}]
+            scenario = scenario_of(design.duration, self.mode, terms, self.load)
+            runs.append(Run(self.actuator, scenario, self.seed, number=number))
+        record = f"{signals}@{design.rate!r} Hz"
+        recordings = simulate_batch(runs, fidelity=self.fidelity, record=record, progress=progress)
+        for item in recordings:
+            if item.status != "ok":
+                raise InputError(
+                    f"the run {item.status}: {item.meta['message']}; a smaller amplitude may do"
+                )
+        return recordings
 
 
 def frequencies(low: float | str, high: float | str) -> tuple[float, float]:
@@ -137,15 +166,6 @@ def frequencies(low: float | str, high: float | str) -> tuple[float, float]:
     if not 0.0 < first < last:
         raise InputError(f"frequencies: {first:g} to {last:g} Hz is no range; 0 < low < high")
     return first, last
-
-
-def require_finished(recordings: list[Recording]) -> None:
-    """Raise `InputError` for a run that tripped or diverged."""
-    for item in recordings:
-        if item.status != "ok":
-            raise InputError(
-                f"the run {item.status}: {item.meta['message']}; a smaller amplitude may do"
-            )
 
 
 class Multisine:
@@ -235,6 +255,9 @@ class _Sweep:
             parts = np.array([values[k : k + self._stretch] for k in starts])
             rows.append(np.fft.rfft(parts * window, axis=1)[:, self._lines])
         return rows[0], rows[1]
+
+
+_DESIGNS: dict[str, type[Multisine | _Sweep]] = {"multisine": Multisine, "sweep": _Sweep}
 
 
 def _sample(low: float, high: float, step: float) -> float:

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.moves import Move, moves_of
 from elevon.calibrate.stages.third_phase import ThirdPhase
@@ -56,7 +55,7 @@ class Driving:
 
     log: Log
     move: Move
-    used: npt.NDArray[np.bool_]
+    used: Bools
     channels: dict[str, Floats]
 
     def __getitem__(self, name: str) -> Floats:
@@ -148,9 +147,7 @@ def _channels(log: Log, actuator: Actuator) -> dict[str, Floats]:
     return channels
 
 
-def _used(
-    log: Log, move: Move, channels: dict[str, Floats], actuator: Actuator
-) -> npt.NDArray[np.bool_]:
+def _used(log: Log, move: Move, channels: dict[str, Floats], actuator: Actuator) -> Bools:
     """The motor pushes as it turns; where the demand is recorded, in continuous current."""
     used = (log.time > move.begin + _START) & (log.time < move.end - _END)
     used &= move.direction * channels["speed"] > _SLOWEST

@@ -16,10 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.block_drive import Motor
 from elevon.calibrate.stages.moves import Move, moves_of
 from elevon.estimate import Determined, Estimate
@@ -57,7 +56,7 @@ class _Ramp:
     """A move's samples, what the unit must have demanded, and where its set point changes."""
 
     log: Log
-    used: npt.NDArray[np.bool_]
+    used: Bools
     demand: Floats
     begin: float
     slows: float

@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.moves import Move, moves_of
@@ -49,7 +48,7 @@ def travels(ctx: Context) -> None:
         ctx.add({path: _joined(rows)} if rows else {}, {path: why})
 
 
-def _lock_switch(log: Log) -> npt.NDArray[np.bool_] | None:
+def _lock_switch(log: Log) -> Bools | None:
     """The lock itself where it was recorded, else the switch on its sleeve."""
     role = "locked" if log.has("locked") else "switch_100"
     return np.asarray(log[role] > 0.5) if log.has(role) else None

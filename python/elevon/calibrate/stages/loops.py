@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.moves import moves_of
 from elevon.calibrate.stages.smooth import quick
@@ -20,7 +19,6 @@ from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
 from elevon.logs.log import Log
 
-Bools = npt.NDArray[np.bool_]
 _COLUMNS = ("gain", "integral", "set_point", "ramp")
 _SHORTEST = 100  # samples of a stretch
 _READING = 2.5e-4  # s between the speed that the unit has read and the one that is recorded

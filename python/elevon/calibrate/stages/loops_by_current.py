@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.context import Context
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.loops import stretches, with_starts
@@ -109,7 +108,7 @@ def _fitted(logs: Sequence[Log], actuator: Actuator, *, smooth: bool) -> Regress
     return regressed(names, with_starts(rows), data, strokes)
 
 
-def _unlimited(log: Log, error: Floats, ahead: Floats, actuator: Actuator) -> npt.NDArray[np.bool_]:
+def _unlimited(log: Log, error: Floats, ahead: Floats, actuator: Actuator) -> Bools:
     value = actuator.parameters.value
     demand = value("control.position_gain") / motor_ratio(actuator) * error + ahead
     limited = np.abs(log["torque_current"]) > _CURRENT * value("control.current_limit")

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.logs.log import Log, per_log
 
-Bools = npt.NDArray[np.bool_]
 LOAD = ("load", "load_cell")
 _WIDTH = 0.05  # s of the polynomials that smooth all channels alike
 #: Eighth order, in the order in which a convolution takes it.

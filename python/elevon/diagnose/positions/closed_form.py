@@ -27,7 +27,8 @@ from elevon.logs.log import bridged
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.logs.log import Bools, Log
+    from elevon.arrays import Bools
+    from elevon.logs.log import Log
 
 RIPPLE = 0.012
 """Amplitude of a resolver's error that is told [rad]: twice what a class of 20 minutes allows."""

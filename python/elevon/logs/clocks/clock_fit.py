@@ -18,11 +18,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Bools, Floats
 from elevon.estimate.covariance import correlated, long_run_covariance
-
-FloatArray = npt.NDArray[np.float64]
 
 RESONATOR_TOLERANCE = 0.005
 """Relative: a ceramic resonator keeps within 0.5 %."""
@@ -72,18 +70,18 @@ class SharedLogs:
         Standard deviation of the filter [s].
     """
 
-    time: FloatArray
-    signals: FloatArray
-    second: FloatArray
-    value: FloatArray
+    time: Floats
+    signals: Floats
+    second: Floats
+    value: Floats
     period: float
     width: float
 
-    def basis(self, at: FloatArray) -> FloatArray:
+    def basis(self, at: Floats) -> Floats:
         """Return a constant and the signals at instants of the drive's clock, (len, 1 + m)."""
         return _columns(self.time, self.signals, at, 1.0)
 
-    def inside(self, offset: float) -> npt.NDArray[np.bool_]:
+    def inside(self, offset: float) -> Bools:
         """Which samples of the second log fall into the first, for an offset [s]."""
         at = self.second + offset
         return np.asarray((at >= self.time[0]) & (at <= self.time[-1]))
@@ -100,7 +98,7 @@ class SharedLogs:
         misfit, _ = self.misfit(offset, inside)
         return 1.0 - float(misfit @ misfit) / power
 
-    def misfit(self, offset: float, among: npt.NDArray[np.bool_]) -> tuple[FloatArray, int]:
+    def misfit(self, offset: float, among: Bools) -> tuple[Floats, int]:
         """Return what the signals leave of some samples for an offset [s], and their rank."""
         basis = self.basis(self.second[among] + offset)
         weights, _, rank, _ = np.linalg.lstsq(basis, self.value[among], rcond=_RANK)
@@ -111,7 +109,7 @@ class SharedLogs:
         step = float(np.median(np.diff(self.second)))
         return max(1.0, 2.0 * math.sqrt(math.pi) * self.width / step)
 
-    def independent(self, misfit: FloatArray) -> float:
+    def independent(self, misfit: Floats) -> float:
         """Return how many independent samples residuals in the order of time are worth."""
         return len(misfit) / max(self.alike(), correlated(misfit))
 
@@ -149,15 +147,15 @@ class _Frame:
     """
 
     logs: SharedLogs
-    rates: FloatArray
-    second: FloatArray
-    value: FloatArray
+    rates: Floats
+    second: Floats
+    value: Floats
     middle: float
     half: float
-    known: FloatArray
-    guess: FloatArray
+    known: Floats
+    guess: Floats
 
-    def linear(self, unknown: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+    def linear(self, unknown: Floats) -> tuple[Floats, Floats, int]:
         """Return residual, derivative of the prediction by the first two unknowns, and rank."""
         turn = (self.second - self.middle) / self.half
         at = self.second + unknown[0] + unknown[1] * turn + unknown[2]
@@ -168,7 +166,7 @@ class _Frame:
         jacobian = np.column_stack((rate, rate * turn))
         return misfit, jacobian - space @ (space.T @ jacobian), space.shape[1]
 
-    def cost(self, unknown: FloatArray, noise: float) -> float:
+    def cost(self, unknown: Floats, noise: float) -> float:
         """Misfit to minimise, for a variance of the residuals."""
         misfit, *_ = self.linear(unknown)
         off = unknown - self.guess
@@ -216,7 +214,7 @@ def fit_clock(
     return _estimate(frame, unknown, inflation, few)
 
 
-def _coloured(jacobian: FloatArray, misfit: FloatArray) -> float:
+def _coloured(jacobian: Floats, misfit: Floats) -> float:
     """How many times white noise's variance is theirs, of the residuals or of their scores."""
     power = max(float(misfit @ misfit), 1e-300)
     scores = long_run_covariance(jacobian * misfit[:, None])
@@ -241,17 +239,17 @@ def _frame(logs: SharedLogs, guess: float, edge: tuple[float, float] | None) -> 
     return _Frame(logs, rates, second, value, middle, half, known, np.array([guess, 0.0, 0.0]))
 
 
-def _lever(middle: float, half: float) -> FloatArray:
+def _lever(middle: float, half: float) -> Floats:
     """Offset at the second clock's zero, as a combination of the unknowns."""
     return np.array([1.0, -middle / half, 0.0])
 
 
-def _noise(frame: _Frame, misfit: FloatArray) -> float:
+def _noise(frame: _Frame, misfit: Floats) -> float:
     floor = (1e-9 * float(np.std(frame.value))) ** 2
     return max(float(misfit @ misfit) / len(misfit), floor, 1e-300)
 
 
-def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
+def _descend(frame: _Frame, unknown: Floats, noise: float) -> Floats:
     """Gauss-Newton with halved steps."""
     cost = frame.cost(unknown, noise)
     for _ in range(_STEPS):
@@ -271,7 +269,7 @@ def _descend(frame: _Frame, unknown: FloatArray, noise: float) -> FloatArray:
     return unknown
 
 
-def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) -> ClockEstimate:
+def _estimate(frame: _Frame, unknown: Floats, inflation: float, few: float) -> ClockEstimate:
     """Deviations: of the scores as they are, `few` times for so few, and of what was known."""
     misfit, two, _ = frame.linear(unknown)
     noise = _noise(frame, misfit) * inflation
@@ -298,8 +296,8 @@ def _estimate(frame: _Frame, unknown: FloatArray, inflation: float, few: float) 
 
 
 def _without_drift(
-    frame: _Frame, unknown: FloatArray, covariance: FloatArray, inverse: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    frame: _Frame, unknown: Floats, covariance: Floats, inverse: Floats
+) -> tuple[Floats, Floats]:
     """Return what the others are with the drift held at zero, and what its true value may do."""
     share = inverse[:, 1] / inverse[1, 1]
     turn = np.eye(3) - np.outer(share, _DRIFT)
@@ -307,12 +305,12 @@ def _without_drift(
     return turn @ unknown, turn @ covariance @ turn.T + misplaced
 
 
-def _pair(row: FloatArray, unknown: FloatArray, covariance: FloatArray) -> tuple[float, float]:
+def _pair(row: Floats, unknown: Floats, covariance: Floats) -> tuple[float, float]:
     """Return a combination of the unknowns and its deviation."""
     return float(row @ unknown), math.sqrt(max(float(row @ covariance @ row), 0.0))
 
 
-def _range(basis: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _range(basis: Floats, value: Floats) -> tuple[Floats, Floats]:
     """Orthonormal columns that span the basis, and weights of it that explain the value best."""
     size = np.linalg.norm(basis, axis=0)
     size = np.where(size > 0.0, size, 1.0)
@@ -323,6 +321,6 @@ def _range(basis: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray
     return left, weights
 
 
-def _columns(time: FloatArray, signals: FloatArray, at: FloatArray, constant: float) -> FloatArray:
+def _columns(time: Floats, signals: Floats, at: Floats, constant: float) -> Floats:
     columns = [np.interp(at, time, signals[:, k]) for k in range(signals.shape[1])]
     return np.column_stack((np.full_like(at, constant), *columns))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import RESONATOR_STD, RESONATOR_TOLERANCE
 from elevon.logs.clocks.quality import clock_quality
@@ -14,7 +15,6 @@ from elevon.logs.clocks.sync import ClockFit, align_clocks, find_trigger
 from elevon.logs.command.note import CommandNote
 from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.loadcell import LoadCellLog, read_loadcell
-from elevon.logs.formats.table import FloatArray
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 
@@ -82,9 +82,9 @@ def join_loadcell(
 
 def _synchronise(
     recording: Recording,
-    choices: list[FloatArray],
-    time: FloatArray,
-    value: FloatArray,
+    choices: list[Floats],
+    time: Floats,
+    value: Floats,
     report: ImportReport,
 ) -> ClockFit | None:
     drive = recording.clocks["drive"].time
@@ -157,7 +157,7 @@ def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
 
 def _shared(
     recording: Recording, gear_ratio: float | None, note: CommandNote | None
-) -> list[FloatArray]:
+) -> list[Floats]:
     """Return the sets of signals that may show what the load cell saw.
 
     A brake acts on the motor shaft, weights and springs on the output: these show in what they
@@ -174,7 +174,7 @@ def _shared(
     return [*brake, *wound]
 
 
-def _braked(recording: Recording) -> list[FloatArray]:
+def _braked(recording: Recording) -> list[Floats]:
     """Return the sets of signals that show a brake's torque on the motor shaft.
 
     What is left of the motor's torque when friction and inertia took their share: torque current,
@@ -196,7 +196,7 @@ def _braked(recording: Recording) -> list[FloatArray]:
     return [signed, signed * direction[:, None], *sets]
 
 
-def _speed(recording: Recording) -> FloatArray | None:
+def _speed(recording: Recording) -> Floats | None:
     if "motor_speed" in recording.roles:
         return recording.role("motor_speed").values
     if "motor_position" not in recording.roles:
@@ -205,7 +205,7 @@ def _speed(recording: Recording) -> FloatArray | None:
     return np.asarray(np.gradient(position, recording.clocks["drive"].time), dtype=np.float64)
 
 
-def _check_overlap(recording: Recording, time: FloatArray, report: ImportReport) -> None:
+def _check_overlap(recording: Recording, time: Floats, report: ImportReport) -> None:
     drive = recording.clocks["drive"].time
     outside = float(np.mean((time < drive[0]) | (time > drive[-1])))
     if outside == 1.0:
@@ -215,8 +215,8 @@ def _check_overlap(recording: Recording, time: FloatArray, report: ImportReport)
 
 
 def _channels(
-    log: LoadCellLog, value: FloatArray, note: CommandNote | None, report: ImportReport
-) -> tuple[dict[str, FloatArray], dict[str, str]]:
+    log: LoadCellLog, value: Floats, note: CommandNote | None, report: ImportReport
+) -> tuple[dict[str, Floats], dict[str, str]]:
     if log.unit == "N m":
         return {"load_cell_torque": value}, {"load_cell_torque": "N m"}
     values, units = {"load_cell_force": value}, {"load_cell_force": "N"}

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import SharedLogs
-
-FloatArray = npt.NDArray[np.float64]
 
 LEAST_R2 = 0.5
 """Share of the load cell's variance that the drive's signals must explain: what they leave is no
@@ -105,8 +104,8 @@ class _Search:
     """Every offset tried: `table` holds what each set of signals explains at each."""
 
     choices: Sequence[SharedLogs]
-    offsets: FloatArray
-    table: FloatArray
+    offsets: Floats
+    table: Floats
 
     def logs(self, place: int) -> SharedLogs:
         """Return the signals that explain most at an offset."""
@@ -170,5 +169,5 @@ class _Search:
         return *shares, one.independent(misfit), rank + 1
 
 
-def _highest(scores: FloatArray, places: npt.NDArray[np.intp]) -> int:
+def _highest(scores: Floats, places: npt.NDArray[np.intp]) -> int:
     return int(places[int(np.argmax(scores[places]))])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Bools, Floats
 from elevon.errors import FormatError
-from elevon.logs.formats.table import FloatArray
 
 IntArray = npt.NDArray[np.intp]
 _GAP = 1.5  # an interval longer than this many periods is a gap
@@ -50,7 +50,7 @@ class ClockQuality:
     keep: IntArray
 
 
-def clock_quality(source: str, time: FloatArray) -> ClockQuality:
+def clock_quality(source: str, time: Floats) -> ClockQuality:
     """Examine a time column [s].
 
     Raises
@@ -76,7 +76,7 @@ def clock_quality(source: str, time: FloatArray) -> ClockQuality:
     return _examine(instants, keep, len(time) - len(instants))
 
 
-def _examine(instants: FloatArray, keep: IntArray, duplicates: int) -> ClockQuality:
+def _examine(instants: Floats, keep: IntArray, duplicates: int) -> ClockQuality:
     steps = np.diff(instants)
     period = float(np.median(steps))
     # Whole periods between samples: time stamps rounded to 1 ms alternate 2 and 3 ms at 400 Hz, so
@@ -107,7 +107,7 @@ def _examine(instants: FloatArray, keep: IntArray, duplicates: int) -> ClockQual
     )
 
 
-def clipped_share(values: FloatArray) -> tuple[float, float]:
+def clipped_share(values: Floats) -> tuple[float, float]:
     """Return the shares of samples that sit in runs at the exact minimum and maximum.
 
     A run is five samples or more; a constant channel has no clipping.
@@ -119,7 +119,7 @@ def clipped_share(values: FloatArray) -> tuple[float, float]:
 
 
 def stuck_spans(
-    time: FloatArray, values: FloatArray, travel: FloatArray, allowed: float
+    time: Floats, values: Floats, travel: Floats, allowed: float
 ) -> list[tuple[float, float]]:
     """Return the spans in which a position stands still although its drive travels.
 
@@ -150,7 +150,7 @@ def stuck_spans(
     return spans
 
 
-def _in_runs(mask: npt.NDArray[np.bool_]) -> int:
+def _in_runs(mask: Bools) -> int:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     lengths = edges[1::2] - edges[::2]
     return int(lengths[lengths >= _RUN].sum())

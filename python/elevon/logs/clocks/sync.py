@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.clocks.clock_fit import ClockEstimate, SharedLogs, fit_clock
 from elevon.logs.clocks.offset_search import LEAST_R2, OffsetGuess, search_offset
 
-FloatArray = npt.NDArray[np.float64]
 _MOST_DRIFT = 0.02  # an RC oscillator's worst: a fit beyond it is none of two clocks
 _SMOOTHING = 3.0  # periods of the slower log
 _ENDS = 2.0  # of the filter's width: what it makes of a log's ends is not used
@@ -89,7 +89,7 @@ class ClockFit:
     set_aside: float | None = None
     refused: tuple[float, float] | None = None
 
-    def to_first(self, time: npt.ArrayLike) -> FloatArray:
+    def to_first(self, time: npt.ArrayLike) -> Floats:
         """Return times of the second clock on the first one."""
         second = np.asarray(time, dtype=np.float64)
         return np.asarray(self.offset + (1.0 + self.drift) * second, dtype=np.float64)
@@ -228,7 +228,7 @@ def _guess(choices: Sequence[SharedLogs], edge: TriggerEdge | None) -> OffsetGue
 
 def _arrays(
     time: npt.ArrayLike, signals: npt.ArrayLike, second_time: npt.ArrayLike, value: npt.ArrayLike
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     t, s, y = (np.asarray(a, dtype=np.float64) for a in (time, second_time, value))
     x = np.asarray(signals, dtype=np.float64)
     x = x[:, None] if x.ndim == 1 else x
@@ -252,7 +252,7 @@ def _arrays(
     return t, np.where(moves, (x - x.mean(axis=0)) / np.where(moves, spread, 1.0), 0.0), s, y
 
 
-def _shared(t: FloatArray, x: FloatArray, s: FloatArray, y: FloatArray) -> SharedLogs:
+def _shared(t: Floats, x: Floats, s: Floats, y: Floats) -> SharedLogs:
     """Pass both logs through one Gaussian filter of a few of the slower one's periods.
 
     Interpolated noise would make the misfit jagged in the offset; one filter on both sides leaves

@@ -10,6 +10,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Bools, Floats
 from elevon.errors import InputError, unknown
 from elevon.estimate.covariance import robust_covariance
 from elevon.estimate.residual import ResidualFit, fit_residual
@@ -17,8 +18,6 @@ from elevon.logs.command.guess import FREE, guesses
 from elevon.logs.command.reconstruct import CommandTrace
 from elevon.plain import WORKING, Plain, key
 from elevon.waveforms import evaluate, wave_records
-
-FloatArray = npt.NDArray[np.float64]
 
 _ANGLES = {"phase"}
 _OUTLIER = 6.0
@@ -63,14 +62,14 @@ class WaveformFit(Plain):
     kind: Annotated[str, key("waveform")]
     values: dict[str, float]
     std: dict[str, float]
-    covariance: Annotated[FloatArray, WORKING]
+    covariance: Annotated[Floats, WORKING]
     rms: float
     samples: Annotated[int, WORKING]
     window: Annotated[tuple[float, float], WORKING]
     converged: Annotated[bool, WORKING]
     outliers: Annotated[int, WORKING] = 0
 
-    def at(self, time: npt.ArrayLike) -> FloatArray:
+    def at(self, time: npt.ArrayLike) -> Floats:
         """Return the fitted command [rad] at instants [s]."""
         return evaluate(self.kind, self.values, np.asarray(time, dtype=np.float64))
 
@@ -168,9 +167,7 @@ def best_waveform(
     return fit_waveform(trace, min(scored)[1])
 
 
-def _selected(
-    trace: CommandTrace, window: tuple[float, float] | None
-) -> tuple[FloatArray, FloatArray]:
+def _selected(trace: CommandTrace, window: tuple[float, float] | None) -> tuple[Floats, Floats]:
     mask = trace.valid.copy()
     if window is not None:
         mask &= (trace.time >= window[0]) & (trace.time <= window[1])
@@ -182,7 +179,7 @@ def _selected(
     return trace.time[mask], trace.position[mask]
 
 
-def _without_rest(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _without_rest(t: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Drop a span at rest before and after the motion: there the command holds one value."""
     noise = 1.4826 * float(np.median(np.abs(np.diff(y)))) / math.sqrt(2.0)
     band = max(_OUTLIER * noise, 0.005 * float(np.ptp(y)))
@@ -193,7 +190,7 @@ def _without_rest(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]
     return (t[first:last], y[first:last]) if last - first >= _LEAST else (t, y)
 
 
-def _first_explained(t: FloatArray, residual: FloatArray) -> int:
+def _first_explained(t: Floats, residual: Floats) -> int:
     """Index after the last sample of the first half beyond the second half's spread."""
     half = len(t) // 2
     spread = 1.4826 * float(np.median(np.abs(residual[half:] - np.median(residual[half:]))))
@@ -201,7 +198,7 @@ def _first_explained(t: FloatArray, residual: FloatArray) -> int:
     return int(off[-1]) + 1 if off.size > 3 else 0
 
 
-def _strays(y: FloatArray, residual: FloatArray) -> npt.NDArray[np.bool_]:
+def _strays(y: Floats, residual: Floats) -> Bools:
     """Mark samples far outside the spread of the others; none when they are more than a few."""
     middle = float(np.median(residual))
     spread = 1.4826 * float(np.median(np.abs(residual - middle)))
@@ -211,13 +208,13 @@ def _strays(y: FloatArray, residual: FloatArray) -> npt.NDArray[np.bool_]:
 
 def _best(
     kind: str,
-    t: FloatArray,
-    y: FloatArray,
+    t: Floats,
+    y: Floats,
     known: Mapping[str, float],
     *,
     free: Sequence[str],
     start: Mapping[str, float] | None = None,
-) -> tuple[dict[str, float], FloatArray, FloatArray, bool]:
+) -> tuple[dict[str, float], Floats, Floats, bool]:
     """Least squares from each guess, the best carried to its end.
 
     Returns its values, Jacobian (n, p), residual, and whether it converged.
@@ -225,7 +222,7 @@ def _best(
     spread = float(np.ptp(t))
     scale = np.array([_typical(name, y, spread) for name in free])
 
-    def solve(base: Mapping[str, float], x0: FloatArray, most: int) -> ResidualFit:
+    def solve(base: Mapping[str, float], x0: Floats, most: int) -> ResidualFit:
         return fit_residual(
             lambda x: _model(kind, base, free, x, t) - y, x0, jacobian="3-point", scale=scale,
             tolerance=1e-13, most=most,
@@ -245,8 +242,8 @@ def _best(
 
 
 def _model(
-    kind: str, base: Mapping[str, float], free: Sequence[str], x: FloatArray, t: FloatArray
-) -> FloatArray:
+    kind: str, base: Mapping[str, float], free: Sequence[str], x: Floats, t: Floats
+) -> Floats:
     values = {**base, **dict(zip(free, map(float, x), strict=True))}
     for name in ("rise", "fall", "hold_high", "hold_low", "sweep_time"):
         if name in values:
@@ -254,7 +251,7 @@ def _model(
     return evaluate(kind, values, t)
 
 
-def _typical(name: str, y: FloatArray, spread: float) -> float:
+def _typical(name: str, y: Floats, spread: float) -> float:
     """Size of a meaningful change of a parameter, for the optimiser's scaling."""
     if "frequency" in name:
         return 0.05 / spread
@@ -271,8 +268,8 @@ def _result(
     kind: str,
     values: dict[str, float],
     free: Sequence[str],
-    t: FloatArray,
-    solution: tuple[FloatArray, FloatArray, bool],
+    t: Floats,
+    solution: tuple[Floats, Floats, bool],
     *,
     timing_std: float | None,
 ) -> WaveformFit:
@@ -293,9 +290,7 @@ def _result(
     return WaveformFit(kind, values, std, covariance, rms, len(t), window, converged)
 
 
-def _covariance(
-    kind: str, free: Sequence[str], jacobian: FloatArray, residual: FloatArray
-) -> FloatArray:
+def _covariance(kind: str, free: Sequence[str], jacobian: Floats, residual: Floats) -> Floats:
     """Covariance of the fitted parameters, shape (p, p).
 
     A step's instant has no derivative: the sampling alone bounds it, which the caller adds.
@@ -308,7 +303,7 @@ def _covariance(
     return covariance
 
 
-def _per_second(values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+def _per_second(values: Mapping[str, float], free: Sequence[str]) -> Floats:
     """Change of each fitted parameter when the whole command comes one second later, shape (p,)."""
     rate = 2.0 * math.pi * values.get("frequency", values.get("start_frequency", 0.0))
     moves = {"phase": -rate, "start": 1.0, "end": 1.0, "time": 1.0}

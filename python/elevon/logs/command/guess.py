@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.waveforms import complete
 
-FloatArray = npt.NDArray[np.float64]
 #: Parameters fitted for each waveform; the others keep their guess or the value given.
 FREE: dict[str, tuple[str, ...]] = {
     "constant": ("value",),
@@ -27,9 +26,7 @@ _CHUNK = 128  # rows of a scan held at once
 _HIGHEST = 50.0  # Hz: no position command of an actuator goes faster
 
 
-def guesses(
-    kind: str, t: FloatArray, y: FloatArray, known: Mapping[str, float]
-) -> list[dict[str, float]]:
+def guesses(kind: str, t: Floats, y: Floats, known: Mapping[str, float]) -> list[dict[str, float]]:
     """Return starting values for one waveform, best first; known parameters as given."""
     if kind == "constant":
         return [{"value": float(np.median(y))}]
@@ -44,13 +41,13 @@ def guesses(
     return _trapezoid(t, y, known)
 
 
-def _thin(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _thin(t: Floats, y: Floats) -> tuple[Floats, Floats]:
     step = max(1, len(t) // _COARSE)
     return t[::step], y[::step]
 
 
 def _oscillation(
-    kind: str, t: FloatArray, y: FloatArray, known: Mapping[str, float]
+    kind: str, t: Floats, y: Floats, known: Mapping[str, float]
 ) -> list[dict[str, float]]:
     duration = float(np.ptp(t))
     if "frequency" in known:
@@ -72,9 +69,7 @@ def _oscillation(
     return starts
 
 
-def _scan(
-    t: FloatArray, y: FloatArray, grid: FloatArray
-) -> list[tuple[float, tuple[float, float, float]]]:
+def _scan(t: Floats, y: Floats, grid: Floats) -> list[tuple[float, tuple[float, float, float]]]:
     """Best frequencies of a sine with free amplitude, phase and bias (variable projection)."""
     x, v = _thin(t, y)
     costs, weights = [], []
@@ -90,7 +85,7 @@ def _scan(
     ]
 
 
-def _project(angle: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _project(angle: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Project values on sin, cos and a constant for each row of angles.
 
     Parameters
@@ -115,7 +110,7 @@ def _project(angle: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.einsum("mn,mn->m", residual, residual), np.asarray(weights, dtype=np.float64)
 
 
-def _chirp(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dict[str, float]]:
+def _chirp(t: Floats, y: Floats, known: Mapping[str, float]) -> list[dict[str, float]]:
     start = known.get("start", float(t[0]))
     sweep = known.get("sweep_time", float(t[-1]) - start)
     base = {"start": start, "sweep_time": sweep, **known}
@@ -157,7 +152,7 @@ def _rates(sweep: float, top: float) -> list[float]:
     return [float(f) for f in np.linspace(0.25 / sweep, top, count)]
 
 
-def _step(t: FloatArray, y: FloatArray) -> dict[str, float]:
+def _step(t: Floats, y: Floats) -> dict[str, float]:
     n = len(y)
     total = np.cumsum(y)
     k = np.arange(1, n)
@@ -170,7 +165,7 @@ def _step(t: FloatArray, y: FloatArray) -> dict[str, float]:
     }
 
 
-def _ramp(t: FloatArray, y: FloatArray) -> dict[str, float]:
+def _ramp(t: Floats, y: Floats) -> dict[str, float]:
     """Best hinge pair on a coarse grid, linear in the level and the slope."""
     x, v = _thin(t, y)
     knots = np.linspace(x[0], x[-1], 41)
@@ -189,7 +184,7 @@ def _ramp(t: FloatArray, y: FloatArray) -> dict[str, float]:
     return {"initial": level, "slope": slope, "start": start, "end": end}
 
 
-def _trapezoid(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list[dict[str, float]]:
+def _trapezoid(t: Floats, y: Floats, known: Mapping[str, float]) -> list[dict[str, float]]:
     low, high = (float(v) for v in np.quantile(y, (0.02, 0.98)))
     span = max(high - low, 1e-12)
     marks = {level: _crossings(t, y, low + level * span) for level in (0.1, 0.5, 0.9)}
@@ -216,7 +211,7 @@ def _trapezoid(t: FloatArray, y: FloatArray, known: Mapping[str, float]) -> list
     return [complete("trapezoid", given)]
 
 
-def _crossings(t: FloatArray, y: FloatArray, level: float) -> list[tuple[float, bool]]:
+def _crossings(t: Floats, y: Floats, level: float) -> list[tuple[float, bool]]:
     above = (y > level).astype(np.int8)
     crossings = []
     for k in np.flatnonzero(np.diff(above)).tolist():

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Bools, Floats
 from elevon.errors import InputError, RangeError
 from elevon.recording import Recording
 
-FloatArray = npt.NDArray[np.float64]
 POSITION_GAIN = 1000.0 / 60.0 * 124.0  # 1/s, output rad to motor-shaft rad/s
 SPEED_LIMIT = 500.0 * math.pi / 30.0  # rad/s
 _MARGIN = 1e-3  # of the limit: a saturated set point comes back rounded or filtered
@@ -36,9 +36,9 @@ class CommandTrace:
         True where the speed set point was inside its limit and both signals are present.
     """
 
-    time: FloatArray
-    position: FloatArray
-    valid: npt.NDArray[np.bool_]
+    time: Floats
+    position: Floats
+    valid: Bools
 
     @property
     def coverage(self) -> float:

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, did_you_mean
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.formats.text import read_text_table
 from elevon.logs.maps.column_map import shipped_map
 from elevon.recording import Recording
@@ -108,7 +109,7 @@ def _recording(table: RawTable, rows: slice, words: list[str], path: Path) -> Re
     )
 
 
-def _joined_time(group: FloatArray, time: FloatArray, source: str) -> tuple[FloatArray, list[int]]:
+def _joined_time(group: Floats, time: Floats, source: str) -> tuple[Floats, list[int]]:
     """Put the cycles one after the other; each is timed from its own zero in the file."""
     joins = np.flatnonzero(np.diff(group) != 0)
     total = np.array(time, dtype=np.float64)

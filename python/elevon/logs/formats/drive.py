@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError, did_you_mean
 from elevon.files import write_bytes
 from elevon.logs.maps.columns import drive_columns
@@ -141,7 +142,7 @@ def _factor(key: str, layout: DriveFormat) -> float:
     return to_display(1.0, unit) if unit else 1.0
 
 
-def _check_arrays(arrays: Mapping[str, npt.NDArray[np.float64]]) -> None:
+def _check_arrays(arrays: Mapping[str, Floats]) -> None:
     rows = arrays["time"].shape
     for name, values in arrays.items():
         if values.ndim != 1 or values.shape != rows:

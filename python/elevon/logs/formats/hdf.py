@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.containers.hdf import array, datasets, opened, text_attribute
 from elevon.errors import quoted
 from elevon.logs.formats.limits import Limits
-from elevon.logs.formats.table import FloatArray
 from elevon.logs.formats.vectors import columns_of, signals_side_by_side
 
 
 def numeric_vectors(
     path: Path, limits: Limits
-) -> tuple[dict[str, FloatArray], dict[str, str], list[str]]:
+) -> tuple[dict[str, Floats], dict[str, str], list[str]]:
     """Read every vector of numbers of an HDF5 file.
 
     Parameters
@@ -42,7 +42,7 @@ def numeric_vectors(
     FormatError
         Damaged file, or content larger than the limits.
     """
-    vectors: dict[str, FloatArray] = {}
+    vectors: dict[str, Floats] = {}
     units: dict[str, str] = {}
     notes: list[str] = []
     with opened(path) as file:

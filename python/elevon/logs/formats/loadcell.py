@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, InputError, RangeError, quoted
 from elevon.files import write_bytes
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.text import read_text_table
 from elevon.units import check_kind, to_si
 
-FloatArray = npt.NDArray[np.float64]
 Notes = tuple[str, ...]
 _UNITS = {"N": "N", "Nm": "N m", "N m": "N m", "kg": "kg", "g": "g"}
 _GRAVITY = 9.80665
@@ -42,13 +42,13 @@ class LoadCellLog:
         What was seen: units stated or assumed, text format.
     """
 
-    time: FloatArray
-    value: FloatArray
+    time: Floats
+    value: Floats
     unit: str
     notes: tuple[str, ...]
 
 
-def brake_torque(force: npt.ArrayLike, arm: float, chain_ratio: float) -> FloatArray:
+def brake_torque(force: npt.ArrayLike, arm: float, chain_ratio: float) -> Floats:
     """Brake torque on the motor shaft [N m] from the force [N] at an arm [m] of the brake shaft.
 
     The chain divides it: the brake shaft turns `chain_ratio` times slower than the motor.
@@ -58,7 +58,7 @@ def brake_torque(force: npt.ArrayLike, arm: float, chain_ratio: float) -> FloatA
     return np.asarray(force, dtype=np.float64) * (arm / chain_ratio)
 
 
-def guide_torque(force_1: npt.ArrayLike, force_2: npt.ArrayLike, radius: float) -> FloatArray:
+def guide_torque(force_1: npt.ArrayLike, force_2: npt.ArrayLike, radius: float) -> Floats:
     """Torque [N m] of two cables on the winding guide of `radius` [m]: (F1 + F2) r."""
     _positive("radius", radius)
     total = np.asarray(force_1, dtype=np.float64) + np.asarray(force_2, dtype=np.float64)
@@ -138,7 +138,7 @@ def read_loadcell(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> LoadC
     return LoadCellLog(seconds, value * factor, unit, (*table.notes, *taken, *converted))
 
 
-def _time_scale(unit: str, name: str, time: FloatArray) -> tuple[float, Notes]:
+def _time_scale(unit: str, name: str, time: Floats) -> tuple[float, Notes]:
     """Return seconds a unit of time, and what was taken for granted."""
     text = unit or ("ms" if name.strip().lower() in {"xms", "time_ms", "timems", "t_ms"} else "")
     if text:

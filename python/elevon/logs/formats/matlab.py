@@ -6,12 +6,13 @@ from collections.abc import Generator, Iterator
 from contextlib import closing
 from pathlib import Path
 
+from elevon.arrays import Floats
 from elevon.containers.hdf import is_hdf5
 from elevon.containers.mat5 import Variable, variables
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.hdf import numeric_vectors
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.formats.vectors import columns_of, signals_side_by_side, table_of_vectors
 
 
@@ -47,13 +48,13 @@ def _bounded(path: Path, limits: Limits) -> Generator[Variable, None, None]:
     return variables(path, lambda size: limits.check_bytes(str(path), size))
 
 
-def _vectors(path: Path, limits: Limits) -> tuple[dict[str, FloatArray], list[str]]:
+def _vectors(path: Path, limits: Limits) -> tuple[dict[str, Floats], list[str]]:
     """Return the numeric vectors of a version 5 file; those inside a structure as ``name/field``.
 
     Columns of a long matrix are vectors. The notes name what is passed over: cells, objects, text,
     complex numbers.
     """
-    vectors: dict[str, FloatArray] = {}
+    vectors: dict[str, Floats] = {}
     notes = []
     total = 0
     for variable in _bounded(path, limits):
@@ -84,7 +85,7 @@ def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
         yield f"{variable.name}/{field.name}", field
 
 
-def _columns(label: str, item: Variable) -> dict[str, FloatArray] | str:
+def _columns(label: str, item: Variable) -> dict[str, Floats] | str:
     """Decode a vector, or the columns of a long matrix; of anything else say what it is."""
     reason = "" if item.kind == "numbers" else item.kind
     if not reason and item.is_complex:

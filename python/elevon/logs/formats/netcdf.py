@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.containers.hdf import is_hdf5
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.hdf import numeric_vectors
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import head
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.formats.vectors import table_of_vectors
 
 
@@ -38,7 +39,7 @@ def read_netcdf(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTabl
 def _classic(file: Path, limits: Limits) -> RawTable:
     from scipy.io import netcdf_file
 
-    vectors: dict[str, FloatArray] = {}
+    vectors: dict[str, Floats] = {}
     units: dict[str, str] = {}
     notes: list[str] = []
     try:

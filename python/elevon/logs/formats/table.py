@@ -6,12 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, quoted
 
 _LARGEST = 1e100  # beyond it squares overflow; nothing measured comes near
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,7 @@ class RawTable:
     """
 
     source: str
-    columns: Mapping[str, FloatArray]
+    columns: Mapping[str, Floats]
     units: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     file_format: str = "csv"

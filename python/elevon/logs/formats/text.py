@@ -18,10 +18,11 @@ from typing import IO
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.opening import open_bytes
-from elevon.logs.formats.table import FloatArray, RawTable, split_unit, unique_names
+from elevon.logs.formats.table import RawTable, split_unit, unique_names
 
 _MISSING = {"", "nan"}
 _BYTES_PER_VALUE = 32
@@ -318,9 +319,7 @@ class LineReader:
         return RawTable(self.source, columns, units, tuple(self.notes), "csv", words)
 
 
-def named_columns(
-    names: list[str], data: FloatArray
-) -> tuple[dict[str, FloatArray], dict[str, str]]:
+def named_columns(names: list[str], data: Floats) -> tuple[dict[str, Floats], dict[str, str]]:
     """Return the columns of a table, shape (n, c), by name, and the units that the names state."""
     pairs = [split_unit(name) for name in names]
     short = [name for name, _ in pairs]

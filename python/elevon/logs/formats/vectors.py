@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.limits import Limits
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 
 #: A matrix with at most so many columns, and at least so many rows a column, holds signals side by
 #: side (ASSUMED): what is nearer to a square is something else.
@@ -18,7 +19,7 @@ _TIMES = ("xms", "time", "t", "time_s", "time_ms", "timems", "x")
 
 def table_of_vectors(
     source: str,
-    vectors: Mapping[str, FloatArray],
+    vectors: Mapping[str, Floats],
     units: Mapping[str, str],
     notes: Sequence[str],
     *,
@@ -63,7 +64,7 @@ def signals_side_by_side(shape: Sequence[int]) -> bool:
     return 1 < few <= _MOST_SIGNALS and many >= _ROWS * few
 
 
-def columns_of(name: str, matrix: FloatArray) -> dict[str, FloatArray]:
+def columns_of(name: str, matrix: Floats) -> dict[str, Floats]:
     """Return the signals of a matrix by name and number, counted from 1 as MATLAB does.
 
     Parameters
@@ -77,7 +78,7 @@ def columns_of(name: str, matrix: FloatArray) -> dict[str, FloatArray]:
     return {f"{name}_{k + 1}": np.ascontiguousarray(rows[:, k]) for k in range(rows.shape[1])}
 
 
-def quiet(values: FloatArray) -> FloatArray:
+def quiet(values: Floats) -> Floats:
     """Return the values with every kind of NaN replaced by the plain one.
 
     A file may hold signalling NaNs, which raise floating-point flags in the next operation.
@@ -86,7 +87,7 @@ def quiet(values: FloatArray) -> FloatArray:
     return np.where(missing, np.nan, values) if missing.any() else values
 
 
-def _length(vectors: Mapping[str, FloatArray]) -> int:
+def _length(vectors: Mapping[str, Floats]) -> int:
     for wanted in _TIMES:
         for name, values in vectors.items():
             if name.rpartition("/")[2].lower() == wanted:

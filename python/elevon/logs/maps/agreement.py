@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
-from elevon.logs.formats.table import FloatArray
 from elevon.logs.maps.column_map import ColumnMap
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
@@ -79,7 +79,7 @@ def check_agreement(
         report.warn(role, "disagrees", f"{text}: unit, sign or scale of one of them is wrong")
 
 
-def slope_and_fit(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def slope_and_fit(x: Floats, y: Floats) -> tuple[float, float]:
     """Slope of y over x and the share of y's variance that it explains; (0, 0) where x stands."""
     good = np.isfinite(x) & np.isfinite(y)
     if good.sum() < _LEAST:
@@ -92,13 +92,13 @@ def slope_and_fit(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     return slope, 1.0 - float(np.sum((dy - slope * dx) ** 2)) / spread
 
 
-def _integral(time: FloatArray, rate: FloatArray) -> FloatArray:
+def _integral(time: Floats, rate: Floats) -> Floats:
     filled = np.where(np.isfinite(rate), rate, 0.0)
     steps = 0.5 * (filled[1:] + filled[:-1]) * np.diff(time)
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-def evened(time: FloatArray) -> FloatArray:
+def evened(time: Floats) -> Floats:
     """Return a time column with the repeated readings of a coarse clock spread evenly.
 
     Parameters

@@ -6,9 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, InputError, quoted, unknown
 from elevon.logs.clocks.quality import IntArray
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.column_map import ColumnEntry, ColumnMap
 from elevon.logs.maps.columns import drive_columns, find_drive_columns, looks_like_drive
 from elevon.logs.maps.shafts import (
@@ -38,7 +39,7 @@ class Assignment:
     role: str = ""
     subtract_from: str | None = None
 
-    def values(self, table: RawTable) -> FloatArray:
+    def values(self, table: RawTable) -> Floats:
         """Return the column as the file means it, before factor and offset."""
         column = table.columns[self.column]
         return column if self.subtract_from is None else table.columns[self.subtract_from] - column
@@ -114,7 +115,7 @@ def _check_some(assigned: Mapping[str, Assignment], table: RawTable) -> None:
 def settle_positions(
     assigned: dict[str, Assignment],
     table: RawTable,
-    time: FloatArray,
+    time: Floats,
     keep: IntArray,
     gear_ratio: float | None,
     *,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elevon.logs.formats.table import FloatArray
+from elevon.arrays import Floats
 
 MOTOR_COUNTS = 2.0**24  # absolute encoder of the motor, counts a turn (test-bench thesis)
 ENCODER_COUNTS = 20_000.0  # 5000 pulses, four edges each, a turn of the encoder's own wheel
@@ -83,7 +83,7 @@ def match(slope: float, candidates: tuple[UnitCandidate, ...]) -> UnitCandidate 
     return min(good, key=lambda c: abs(math.log(abs(slope) / c.scale))) if good else None
 
 
-def slope_with_backlash(reference: FloatArray, position: FloatArray) -> Fit:
+def slope_with_backlash(reference: Floats, position: Floats) -> Fit:
     """Fit a position as slope x (reference passed through a dead zone) + offset.
 
     Parameters
@@ -114,7 +114,7 @@ def slope_with_backlash(reference: FloatArray, position: FloatArray) -> Fit:
     return Fit(slope, width, error, travel)
 
 
-def _golden(x: FloatArray, y: FloatArray, low: float, high: float) -> float:
+def _golden(x: Floats, y: Floats, low: float, high: float) -> float:
     ratio = (math.sqrt(5.0) - 1.0) / 2.0
     for _ in range(12):
         a, b = high - ratio * (high - low), low + ratio * (high - low)
@@ -125,7 +125,7 @@ def _golden(x: FloatArray, y: FloatArray, low: float, high: float) -> float:
     return 0.5 * (low + high)
 
 
-def _through_backlash(x: FloatArray, width: float) -> FloatArray:
+def _through_backlash(x: Floats, width: float) -> Floats:
     """Pass a motion through a dead zone of a total width (Prandtl's backlash operator)."""
     if width == 0.0:
         return x
@@ -138,7 +138,7 @@ def _through_backlash(x: FloatArray, width: float) -> FloatArray:
     return out
 
 
-def _line(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _line(x: Floats, y: Floats) -> tuple[float, float]:
     """Slope of y over x, and the RMS of the residual over that of the fitted motion."""
     dx, dy = x - x.mean(), y - y.mean()
     power = float(dx @ dx)

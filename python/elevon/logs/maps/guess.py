@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import FormatError, quoted
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.agreement import evened, slope_and_fit
 from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint, unit_hint
@@ -83,7 +84,7 @@ def guess_map(table: RawTable) -> Guess:
     )  # fmt: skip
 
 
-def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> FloatArray:
+def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> Floats:
     """Settle the time column and return it in s."""
     rising = {}
     for name, values in table.columns.items():
@@ -153,7 +154,7 @@ def _drop_odd_unit(item: GuessedColumn) -> None:
 
 def _candidates(
     table: RawTable, columns: Mapping[str, GuessedColumn]
-) -> dict[str, tuple[str, str, FloatArray]]:
+) -> dict[str, tuple[str, str, Floats]]:
     """Columns that may be positions or speeds: role so far, unit so far, values without holes."""
     moving = {"", "command", "output_position", "output_speed", "motor_position", "motor_speed",
               "speed_ref"}  # fmt: skip
@@ -184,7 +185,7 @@ def _apply(motion: MotionColumns, columns: Mapping[str, GuessedColumn]) -> None:
 
 
 def _current(
-    time: FloatArray, table: RawTable, columns: Mapping[str, GuessedColumn], motion: MotionColumns
+    time: Floats, table: RawTable, columns: Mapping[str, GuessedColumn], motion: MotionColumns
 ) -> None:
     """Find the current among what is left: acceleration, friction and speed explain it."""
     if any(item.role in {"torque_current", "current_ref"} for item in columns.values()):

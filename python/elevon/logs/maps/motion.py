@@ -13,11 +13,11 @@ from itertools import permutations
 
 import numpy as np
 
-from elevon.logs.formats.table import FloatArray
+from elevon.arrays import Floats
 from elevon.logs.maps.agreement import slope_and_fit
 from elevon.units import parse_unit
 
-Candidates = Mapping[str, tuple[str, str, FloatArray]]
+Candidates = Mapping[str, tuple[str, str, Floats]]
 _INTEGRAL = 0.9  # share of a position that the integral of its speed explains
 _FOLLOWS = 0.5  # share of a signal that its delayed set point explains
 _SAME = 0.02  # relative: a factor nearer one than this is one
@@ -59,13 +59,13 @@ class MotionColumns:
     findings: dict[str, ColumnFinding] = field(default_factory=dict)
     position: str | None = None
     speed: str | None = None
-    smooth: FloatArray = field(default_factory=lambda: np.zeros(0))
+    smooth: Floats = field(default_factory=lambda: np.zeros(0))
     gear_ratio: float | None = None
     travel_per_turn: float | None = None
     swapped: tuple[str, str] | None = None
 
 
-def find_motion(time: FloatArray, candidates: Candidates) -> MotionColumns:
+def find_motion(time: Floats, candidates: Candidates) -> MotionColumns:
     """Find positions, speeds and set points.
 
     Parameters
@@ -93,7 +93,7 @@ def find_motion(time: FloatArray, candidates: Candidates) -> MotionColumns:
     return motion
 
 
-def _best_pair(time: FloatArray, candidates: Candidates) -> tuple[str, str, float, float] | None:
+def _best_pair(time: Floats, candidates: Candidates) -> tuple[str, str, float, float] | None:
     """Return the position and speed that fit best, the slope, and the share explained."""
     best = None
     for position, speed in permutations(candidates, 2):
@@ -200,7 +200,7 @@ def _unit_of_position(motion: MotionColumns, name: str, candidates: Candidates) 
 
 
 def _set_point(
-    time: FloatArray, candidates: Candidates, motion: MotionColumns, follower: str, role: str
+    time: Floats, candidates: Candidates, motion: MotionColumns, follower: str, role: str
 ) -> None:
     """Find what a signal follows: of its size, and earlier; a header that says so comes first."""
     output = candidates[follower][2]
@@ -229,7 +229,7 @@ def _set_point(
     motion.findings[name] = finding
 
 
-def _lag(time: FloatArray, ahead: FloatArray, behind: FloatArray) -> tuple[float, float, float]:
+def _lag(time: Floats, ahead: Floats, behind: Floats) -> tuple[float, float, float]:
     """Return by how much (s) one signal is behind another, the slope and the share explained."""
     step = float(np.median(np.diff(time)))
     most = min(int(_LONGEST / step), len(time) // 4)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
-from elevon.logs.formats.table import FloatArray
 from elevon.logs.maps.consistency import (
     Fit,
     UnitCandidate,
@@ -35,7 +35,7 @@ class PositionStatement:
     per_rad: float | None = None
 
 
-def travel_from_speed(time: FloatArray, speed: FloatArray) -> FloatArray:
+def travel_from_speed(time: Floats, speed: Floats) -> Floats:
     """Integrate a speed [rad/s] by the trapezoidal rule; missing samples are bridged."""
     good = np.isfinite(speed)
     filled = np.interp(time, time[good], speed[good]) if good.any() else np.zeros_like(time)
@@ -45,9 +45,9 @@ def travel_from_speed(time: FloatArray, speed: FloatArray) -> FloatArray:
 
 def settle_motor(
     statement: PositionStatement,
-    time: FloatArray,
-    position: FloatArray,
-    speeds: Sequence[FloatArray],
+    time: Floats,
+    position: Floats,
+    speeds: Sequence[Floats],
     report: ImportReport,
     *,
     name: str = "resolver_position",
@@ -105,8 +105,8 @@ def settle_motor(
 
 def settle_encoder(
     statement: PositionStatement,
-    reference: FloatArray,
-    position: FloatArray,
+    reference: Floats,
+    position: Floats,
     ratio: float,
     report: ImportReport,
     *,
@@ -166,7 +166,7 @@ def settle_encoder(
     return 1.0 / (candidate.scale * ratio), True
 
 
-def _against(reference: FloatArray, position: FloatArray) -> Fit:
+def _against(reference: Floats, position: Floats) -> Fit:
     """Fit without backlash; a slow drift of the integrated speed is removed where it is seen."""
     good = np.isfinite(reference) & np.isfinite(position)
     x, y = reference[good], position[good]

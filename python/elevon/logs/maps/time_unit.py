@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from elevon.logs.formats.table import FloatArray, RawTable
+from elevon.arrays import Floats
+from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.agreement import evened, slope_and_fit
 from elevon.logs.maps.guess_column import GuessedColumn
 from elevon.logs.maps.hints import role_hint
@@ -56,9 +57,7 @@ def _doubtful(step: float, unit: str) -> bool:
     return fast or (unit == "s" and all(1.0 <= rate <= 1.0001e6 for rate in rates))
 
 
-def _by_motion(
-    time: FloatArray, table: RawTable, columns: Mapping[str, GuessedColumn]
-) -> str | None:
+def _by_motion(time: Floats, table: RawTable, columns: Mapping[str, GuessedColumn]) -> str | None:
     """Unit in which a position is the integral of its speed, both units from the headers."""
     steps = np.diff(time, prepend=time[0])
     for place, unit in _stated(_PLACES, table, columns):
@@ -74,7 +73,7 @@ def _by_motion(
 
 def _stated(
     roles: tuple[str, ...], table: RawTable, columns: Mapping[str, GuessedColumn]
-) -> list[tuple[FloatArray, Unit]]:
+) -> list[tuple[Floats, Unit]]:
     """Values in SI, and units, of the columns whose headers name a role and state a unit."""
     chosen = []
     for name, item in columns.items():
