@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from elevon.recording import Recording
+from elevon.reproduce.case_page import case_page
 from elevon.reproduce.nasa.figures import (
     LEVELS,
     RESISTANCES,
@@ -18,7 +19,6 @@ from elevon.reproduce.nasa.figures import (
     reproduce_faults,
     seeding_checks,
 )
-from elevon.reproduce.nasa.page_figures import faults_report
 from elevon.reproduce.pisa_currents import (
     SEQUENCE,
     SectorRow,
@@ -127,7 +127,7 @@ def test_stretches_at_rest_are_none():
 def test_the_ballscrews_figures_pass():
     result = reproduce_faults()
     assert failed(result.checks) == []
-    assert "baseline" in faults_report(result, date="2026-01-01").html()
+    assert "baseline" in case_page("nasa-faults", result, date="2026-01-01").html()
 
 
 @pytest.mark.long

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from elevon.cli import main
+from elevon.reproduce.case_page import case_page
 from elevon.reproduce.nasa.current import PUBLISHED, CurrentResult, CurrentRow
-from elevon.reproduce.nasa.page_current import current_report
 
 
 def rows(percent):
@@ -35,7 +35,7 @@ def test_fewer_runs_than_published_fail():
 
 
 def test_the_page_says_what_measured_means_and_shows_the_published_figures():
-    page = current_report(CurrentResult(rows(7.0), [], 0, ""), date="2026-01-01").html()
+    page = case_page("nasa-current", CurrentResult(rows(7.0), [], 0, ""), date="2026-01-01").html()
     assert "not published" in page
     for figures in PUBLISHED.values():
         for value in figures:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
@@ -19,6 +19,7 @@ from elevon.reproduce.catalogue import Published, published
 
 if TYPE_CHECKING:
     from elevon.report import Report
+    from elevon.report.checks import CheckedResult
 
 Options = Mapping[str, Any]
 Values = dict[str, Any]
@@ -45,7 +46,8 @@ class PublishedCase:
     table : str or None
         Above that table.
     page : str
-        Result to the report; empty: nothing is written.
+        Result to the report; ``described``: by its description in `elevon.reproduce`; empty:
+        nothing is written.
     options : mapping of str to mapping
         Options beyond those that every case has: as in ``options.toml``, with ``default``, or with
         ``type`` (``path``, ``texts``, ``count``) and, where it must be given, ``required``.
@@ -97,6 +99,14 @@ class PublishedCase:
     def defaults(self) -> dict[str, Any]:
         """Return its options as they are when none is given."""
         return {name: default for name, (_, default) in self.signature().items()}
+
+    def report(self, result: CheckedResult, options: Options) -> Report:
+        """Return the page of a result."""
+        if self.page != "described":
+            return cast("Report", self.call(self.page, result, **options))
+        from elevon.reproduce.case_page import case_page
+
+        return case_page(self.name, result, date=options["date"], options=options)
 
     def call(self, function: str, *arguments: Any, **options: Any) -> Any:
         """Call a function by its name, with the options that it has arguments for."""
@@ -179,7 +189,7 @@ def compute(case: PublishedCase, options: Options, progress: Any) -> tuple[Any, 
     values: Values = result.to_dict()
     out: Path | None = options.get("out")
     if out is not None and case.page:
-        report = case.call(case.page, result, **options)
+        report = case.report(result, options)
         _write(out, report, values["rows"], options["force"])
     return result, values
 

@@ -103,6 +103,20 @@ class CurrentResult:
         return float(np.mean(values)), max(values), min(values)
 
     @property
+    def compared(self) -> list[tuple[str, str, float, float, float]]:
+        """State, source, average, maximum and minimum: the published ones and ours."""
+        between = "percent_between_corners"
+        return [
+            (state, source, *values)
+            for state in PUBLISHED
+            for source, values in (
+                ("published", PUBLISHED[state]),
+                ("here", self.summary(state)),
+                ("here, between corners", self.summary(state, between)),
+            )
+        ]
+
+    @property
     def checks(self) -> list[Check]:
         """As many runs as published; average and maximum against the paper's own."""
         nominal = [row for row in self.rows if row.state == "nominal"]
@@ -125,11 +139,9 @@ class CurrentResult:
             "percent_rms": "RMS error over the measured current's RMS about its mean",
             "summary": {
                 state: {
-                    "published": dict(zip(names, PUBLISHED[state], strict=True)),
-                    "here": dict(zip(names, self.summary(state), strict=True)),
-                    "here_between_corners": dict(
-                        zip(names, self.summary(state, "percent_between_corners"), strict=True)
-                    ),
+                    name.replace(", ", "_").replace(" ", "_"): dict(zip(names, values, strict=True))
+                    for of, name, *values in self.compared
+                    if of == state
                 }
                 for state in PUBLISHED
             },

@@ -1,0 +1,50 @@
+"""The page of a published case: its description (`pages/NAME.toml`), filled from its result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from elevon.data import packaged_toml
+from elevon.reproduce.provenance import closed
+
+if TYPE_CHECKING:
+    from elevon.report import Report
+    from elevon.report.checks import CheckedResult
+
+
+def case_page(
+    name: str,
+    result: CheckedResult,
+    *,
+    date: str | None = None,
+    options: Mapping[str, object] | None = None,
+) -> Report:
+    """Return the report of a case.
+
+    Parameters
+    ----------
+    name : str
+        Of the case.
+    result : CheckedResult
+        What it found.
+    date : str, optional
+        Printed on the page.
+    options : mapping, optional
+        Of its command: what the page says of how it is made again.
+    """
+    from elevon.report.described import described, text
+
+    page = packaged_toml("elevon.reproduce", f"pages/{name}.toml")
+    names: dict[str, object] = {
+        "result": result,
+        "case": import_module(type(result).__module__),
+        "option": options or {},
+    }
+    if "values" in page:  # what an expression cannot say: a function of the result
+        module, _, function = page["values"].partition(":")
+        names |= getattr(import_module(module), function)(result)
+    report = described(page, names, date=date)
+    made = {key: text(item, names) for key, item in page.get("made", {}).items()}
+    return closed(report, result.checks, text(page.get("command", name), names), **made)
