@@ -25,6 +25,7 @@ Faults = Sequence[tuple[CandidateFault, float]]
 
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
+_FEWER = 5000  # draws that show such a chance
 _SHARE = 3.0  # a unit's value over the model's, either way, that a shift is scaled by at most
 #: Deviations that a fault moves the features by at least where its direction counts: what one
 #: direction alone needs at 5 % of false alarms; a smaller fault is not called by itself.
@@ -206,14 +207,14 @@ def farthest(case: LogCase) -> Reason:
 
 def chance_of(case: LogCase, candidates: Sequence[CandidateFault]) -> float:
     """Return how often a healthy unit deviates as much as this log."""
-    residual, root, detector = detector_of([case], candidates)
+    residual, root, detector = detector_of([case], candidates, _FEWER)
     return detector.chance(float(detector.score((root @ residual)[None, :])[0]))
 
 
 def detector_of(
-    cases: Sequence[LogCase], candidates: Sequence[CandidateFault]
+    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], count: int = DRAWS
 ) -> tuple[Floats, Floats, Detector]:
-    """Return the deviation from healthy, what whitens it, and the test of healthy or not.
+    """Return the deviation from healthy, what whitens it, and the test by so many draws.
 
     A shift shorter than
     `_DIRECTED` has no direction that is known: the runs' rounding is as large, and another in each.
@@ -228,13 +229,13 @@ def detector_of(
         rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
         both += [False] * len(rows[-1])
     degrees = min(case.unit.degrees for case in cases)
-    draws = _drawn(cases) @ root.T
+    draws = _drawn(cases, count) @ root.T
     return residual, root, Detector(np.vstack(rows), both, degrees, ANYWHERE, draws)
 
 
-def _drawn(cases: Sequence[LogCase]) -> Floats:
+def _drawn(cases: Sequence[LogCase], count: int) -> Floats:
     """Draws of healthy logs' deviations, with what is not known of their spread."""
-    parts = [c.unit.drawn(DRAWS, c.features.std, 15 + k) for k, c in enumerate(cases)]
+    parts = [c.unit.drawn(count, c.features.std, 15 + k) for k, c in enumerate(cases)]
     return np.hstack(parts)
 
 

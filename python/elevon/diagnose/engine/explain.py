@@ -33,6 +33,7 @@ LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 REFUTED = 5.0  # deviations that faults leave of one feature: such faults are not named. ASSUMED
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding
+_STEPS, _FINER = 100, 20  # severities over the range, and between two of them
 _POINTS = 201  # severities of another fault that are held against a cause
 
 
@@ -237,11 +238,9 @@ def limits(
     """Return what the logs cannot show, and the least severity of what they can."""
     blind, limits = [], {}
     for c in candidates:
-        grid = np.linspace(0.0, c.high, 2001)
-        size = np.linalg.norm(shift_of(cases, c.key, grid) @ root.T, axis=1)
-        seen = np.flatnonzero(size > SEEN)
-        if seen.size:
-            limits[c.key] = float(grid[seen[0]])
+        least = _least_seen(cases, c, root)
+        if least is not None:
+            limits[c.key] = least
             continue
         reason = (
             f"up to {c.high:g} {c.unit if c.unit != '1' else ''}".rstrip()
@@ -250,6 +249,20 @@ def limits(
         names = ((c.kind, c.place), *c.ambiguous)
         blind += [{"kind": kind, "place": place, "reason": reason} for kind, place in names]
     return tuple(blind), limits
+
+
+def _least_seen(cases: Sequence[LogCase], c: CandidateFault, root: Floats) -> float | None:
+    """Return the least severity that moves the features by `SEEN`, by a grid and one within it."""
+    grid = np.linspace(0.0, c.high, _STEPS + 1)
+    for _ in range(2):
+        size = np.linalg.norm(shift_of(cases, c.key, grid) @ root.T, axis=1)
+        seen = np.flatnonzero(size > SEEN)
+        if not seen.size:
+            return None
+        k = int(seen[0])
+        least = float(grid[k])
+        grid = np.linspace(grid[max(k - 1, 0)], least, _FINER + 1)
+    return least
 
 
 def moved(

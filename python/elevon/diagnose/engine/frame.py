@@ -52,8 +52,10 @@ class Frame:
     lines: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        from scipy.linalg.lapack import dtrtri
+
         lower = np.linalg.cholesky(self.covariance)
-        object.__setattr__(self, "root", np.linalg.inv(lower))
+        object.__setattr__(self, "root", dtrtri(lower, lower=1)[0])
         object.__setattr__(self, "y", self.root @ self.residual)
         object.__setattr__(self, "log_det", 2.0 * float(np.sum(np.log(np.diag(lower)))))
 

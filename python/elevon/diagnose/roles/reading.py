@@ -334,12 +334,19 @@ class RoleReading(Reading):
         return float(np.sqrt(np.mean(off**2))) / size
 
     def within(self, seconds: float, like: RoleReading | None = None) -> RoleReading:
-        """Return the test up to some seconds after its onset."""
+        """Return the test up to some seconds after its onset; the same one when asked again."""
         if seconds >= self.seconds and like is None:
             return self
-        keep = self.log.time < seconds * (1.0 + 1e-9)
-        log = self.log.part(keep, 0.0, seconds)
-        return replace(self, log=log, seconds=min(seconds, self.seconds), like=like)
+        if (seconds, like) not in self._parts:
+            log = self.log.part(self.log.time < seconds * (1.0 + 1e-9), 0.0, seconds)
+            part = replace(self, log=log, seconds=min(seconds, self.seconds), like=like)
+            self._parts[seconds, like] = part
+        return self._parts[seconds, like]
+
+    @cached_property
+    def _parts(self) -> dict[tuple[float, RoleReading | None], RoleReading]:
+        """What was read of it so far: many logs stand against one baseline."""
+        return {}
 
     def matched(self, same: Sequence[Reading]) -> tuple[Reading, list[Reading]]:
         """Return the log and its baselines, each read as far as the shortest of them goes."""
