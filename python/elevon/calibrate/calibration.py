@@ -86,7 +86,9 @@ def calibrate(
     skipped = {log.name: _run_in(log, transient) for log in logs}
     used = [log.counting(log.time >= skipped[log.name]) for log in logs]
     runs = fidelity if model_runs else None
-    context = DriveContext(logs, used, actuator, free, per_log, runs, progress)
+    context = DriveContext(
+        logs, actuator, used=used, free=free, per_log=per_log, fidelity=runs, progress=progress
+    )
     run_stages(DRIVE_STAGES, context, 0.02, _RUNS)
     estimates, dynamic = context.accepted, context.dynamic
     fitted = with_values(actuator, estimates, context.followed, context.torque, dynamic)
@@ -96,16 +98,14 @@ def calibrate(
         actuator=fitted,
         before=actuator,
         logs=log_facts(
-            logs,
-            brake={log.name: log.brake.known for log in logs},
-            skipped_s=skipped,
+            logs, brake={log.name: log.brake.known for log in logs}, skipped_s=skipped,
             warnings={log.name: log.warnings for log in logs},
         ),
         parameters=by_path(estimates),
         facts={**_facts(context), **_of_runs(dynamic), "held_out": errors},
         findings=_findings(context),
         wall_s=clock.perf_counter() - begin,
-    )
+    )  # fmt: skip
 
 
 def _facts(context: DriveContext) -> dict[str, object]:
@@ -183,8 +183,7 @@ def _check(
 def _run_in(log: Log, transient: float | None) -> float:
     """Seconds left out: until the set point has left its limit for the first time, 1 s at least."""
     if transient is not None:
-        if not 0.0 <= transient < log.duration:
-            raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
+        log.after(transient)
         return transient
     limit = 0.999 * saturated_speed(log)
     limited = np.abs(log.speed_ref) >= limit

@@ -12,8 +12,8 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.validation import Validation, ValidationTrace
-from elevon.errors import InputError, SimulationError, unknown
+from elevon.calibrate.validation import Validation, ValidationTrace, promised, promised_transient
+from elevon.errors import InputError, SimulationError
 from elevon.experiment import Experiment, Inputs, ModelRun
 from elevon.logs.log import Log, on_clock
 from elevon.progress import Progress, part
@@ -145,20 +145,14 @@ def validate_replay(
     SimulationError
         A run did not reach its end.
     """
-    promised = actuator.validation or {}
-    limits, offsets = dict(promised.get("limits", {})), dict(promised.get("offsets", {}))
-    given = float(promised.get("transient", 0.0)) if transient is None else transient
+    given, offsets = promised_transient(actuator, transient, 0.0), promised(actuator, "offsets")
     traces, errors = [], []
     for number, (name, recording) in enumerate(logs):
         share = part(progress, number / len(logs), (number + 1) / len(logs))
         log = Log.of(recording, name, clock="output_position")
         trace = _trace(log, actuator, fidelity, given, share)
-        for signal in limits:
-            if signal not in trace.measured:
-                raise unknown(
-                    "signal", signal, trace.measured, f"{actuator.name}: validation.limits"
-                )
         traces.append(trace)
+        limits = promised(actuator, "limits", trace.measured)
         errors += trace.errors(log.units, limits, offsets)
     how = {name: "as logged" for name, _ in logs}
     return Validation(actuator.name, fidelity, given, tuple(errors), how, tuple(traces), offsets)
@@ -167,11 +161,9 @@ def validate_replay(
 def _trace(
     log: Log, actuator: Actuator, fidelity: str, transient: float, progress: Progress | None
 ) -> ValidationTrace:
-    if not transient < log.duration:
-        raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
-    experiment = unit_experiment(log, actuator, fidelity)
+    late, experiment = log.after(transient), unit_experiment(log, actuator, fidelity)
     run = replayed(experiment, progress)
     roles = [role for role in experiment.shows if log.units.get(role) != "1"]
     simulated = {role: as_recorded(log, run, role) for role in roles}
-    used = (log.time >= transient) & (log.time <= run.seconds)
+    used = late.good & (log.time <= run.seconds)
     return ValidationTrace(log.name, log.time, {role: log[role] for role in roles}, simulated, used)

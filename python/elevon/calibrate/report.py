@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from elevon.calibrate.outcome import Calibration
-    from elevon.calibrate.validation import Validation, ValidationTrace
+    from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 
 #: How a quantity is shown, by its SI unit.
 _DISPLAY = {
@@ -120,28 +120,24 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
         f"Intervals hold {100 * LEVEL:.0f} % of the time for coloured residuals. Plant, controller "
         "and sensor are kept apart; what no actuator file has a place for is marked.",
     )
-    columns = ["Parameter", "Before", "After", "Interval", "Unit", "Register", "From", "Holds for"]
-    if truth:
-        columns.insert(2, "Truth")
-    rows = []
-    for item in result.estimates:
-        row: list[object] = [
-            item.path + ("" if item.in_set else " *"),
-            item.old,
-            item.value,
-            f"{item.interval[0]:.5g} to {item.interval[1]:.5g}",
-            item.unit,
-            item.register,
-            item.source,
-            ", ".join(item.given),
-        ]
-        if truth:
-            row.insert(2, truth.get(item.path))
-        rows.append(row)
+    rows: list[dict[str, object]] = [
+        {
+            "Parameter": item.path + ("" if item.in_set else " *"),
+            "Before": item.old,
+            **({"Truth": truth.get(item.path)} if truth else {}),
+            "After": item.value,
+            "Interval": f"{item.interval[0]:.5g} to {item.interval[1]:.5g}",
+            "Unit": item.unit,
+            "Register": item.register,
+            "From": item.source,
+            "Holds for": ", ".join(item.given),
+        }
+        for item in result.estimates
+    ]
     figure = forest(result.estimates, truth)
     if figure is not None:
         section.figure(figure, "Estimates over the old values, with their intervals.")
-    section.table(ReportTable(columns, rows, "* not part of the actuator file", digits=5))
+    section.table(ReportTable.of(rows, "* not part of the actuator file"))
 
 
 def _ranking(report: Report, ranking: Mapping[str, Any] | None) -> None:
@@ -155,14 +151,9 @@ def _ranking(report: Report, ranking: Mapping[str, Any] | None) -> None:
     )
     rows = [[k + 1, float(s)] for k, s in enumerate(ranking["singular_values"])]
     section.table(ReportTable(["", "Singular value"], rows, digits=4))
-    section.table(
-        ReportTable(
-            ["Candidate", "Predicted deviation"],
-            sorted(ranking["predicted"].items()),
-            "Relative for positive parameters, SI for offsets and delays.",
-            digits=3,
-        )
-    )
+    text = "Relative for positive parameters, SI for offsets and delays."
+    deviations = sorted(ranking["predicted"].items())
+    section.table(ReportTable(["Candidate", "Predicted deviation"], deviations, text, digits=3))
     pairs = [f"{a} and {b}: correlation {c:+.3f}" for a, b, c in ranking["correlated"]]
     section.points(pairs or ["No pair is correlated by more than 0.95."])
     section.points(
@@ -174,36 +165,23 @@ def _ranking(report: Report, ranking: Mapping[str, Any] | None) -> None:
 def _held_out(report: Report, held_out: Sequence[Mapping[str, Any]]) -> None:
     if not held_out:
         return
+    rpm = 30.0 / math.pi
     rows = [
-        [
-            h["log"],
-            h["span"],
-            h["speed_rms"] * 30.0 / math.pi,
-            h["speed_rms_all_data"] * 30.0 / math.pi,
-            h["current_rms"],
-            h["current_rms_all_data"],
-        ]
+        {
+            "Log": h["log"],
+            "Kept back": h["span"],
+            "Speed, without it [rpm]": h["speed_rms"] * rpm,
+            "with it [rpm]": h["speed_rms_all_data"] * rpm,
+            "Current, without it [A]": h["current_rms"],
+            "with it [A]": h["current_rms_all_data"],
+        }
         for h in held_out
     ]
     report.section(
         "Held-out logs",
         "Each log predicted with values fitted without it: errors near those with all logs mean "
         "that nothing was fitted that only one log shows.",
-    ).table(
-        ReportTable(
-            [
-                "Log",
-                "Kept back",
-                "Speed, without it [rpm]",
-                "with it [rpm]",
-                "Current, without it [A]",
-                "with it [A]",
-            ],
-            rows,
-            "RMS errors of the model runs.",
-            digits=3,
-        )
-    )
+    ).table(ReportTable.of(rows, "RMS errors of the model runs.", digits=3))
 
 
 def _agreement(report: Report, before: Validation | None, after: Validation) -> None:
@@ -213,33 +191,8 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
         "its range.",
     )
     old = {(e.log, e.signal): e for e in before.errors} if before else {}
-    columns = [
-        "Log",
-        "Signal",
-        "Unit",
-        "RMS",
-        "Max",
-        "RMS/RMS [%]",
-        "RMS/range [%]",
-        "Max/range [%]",
-    ]
-    rows = []
-    for e in after.errors:
-        factor, unit = _DISPLAY.get(e.unit, (1.0, e.unit))
-        row: list[object] = [
-            e.log,
-            _label(e.signal),
-            unit,
-            factor * e.rms,
-            factor * e.largest,
-            e.of_rms,
-            e.of_range,
-            e.largest_of_range,
-        ]
-        if before:
-            row.append(factor * old[e.log, e.signal].rms)
-        rows.append(row)
-    section.table(ReportTable([*columns, *(["RMS before"] if before else [])], rows, digits=3))
+    rows = [_error_row(e, old.get((e.log, e.signal))) for e in after.errors]
+    section.table(ReportTable.of(rows, digits=3))
     earlier = {t.log: t for t in before.traces} if before else {}
     units = {e.signal: e.unit for e in after.errors}
     for trace in after.traces:
@@ -247,6 +200,21 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
             _traces(trace, earlier.get(trace.log), after.transient, units),
             f"{trace.log}: measured and simulated, residual, spectrum of the residual.",
         )
+
+
+def _error_row(error: SignalError, before: SignalError | None) -> dict[str, object]:
+    factor, unit = _DISPLAY.get(error.unit, (1.0, error.unit))
+    return {
+        "Log": error.log,
+        "Signal": _label(error.signal),
+        "Unit": unit,
+        "RMS": factor * error.rms,
+        "Max": factor * error.largest,
+        "RMS/RMS [%]": error.of_rms,
+        "RMS/range [%]": error.of_range,
+        "Max/range [%]": error.largest_of_range,
+        **({"RMS before": factor * before.rms} if before else {}),
+    }
 
 
 def _label(signal: str) -> str:
@@ -274,15 +242,15 @@ def _traces(
             left.plot(time[thin], data[keep][thin], color=COLOURS["grey"], lw=2.2, label="log")
             left.plot(time[thin], model[keep][thin], color=COLOURS["orange"], lw=0.9, label="model")
             left.set(ylabel=f"{_label(name)} [{unit}]")
-            if before is not None:
-                residual = factor * (before.simulated[name] - before.measured[name])[keep]
-                middle.plot(
-                    time[thin], residual[thin], color=COLOURS["blue"], lw=0.7, label="before"
-                )
-            residual = (model - data)[keep]
-            middle.plot(time[thin], residual[thin], color=COLOURS["orange"], lw=0.7, label="after")
+            both = (("before", before, "blue"), ("after", trace, "orange"))
+            for label, of, colour in both:
+                if of is not None:
+                    residual = factor * (of.simulated[name] - of.measured[name])[keep]
+                    middle.plot(
+                        time[thin], residual[thin], color=COLOURS[colour], lw=0.7, label=label
+                    )
             middle.set(ylabel=f"model less log [{unit}]")
-            frequency, density = _spectrum(trace.time[keep], residual)
+            frequency, density = _spectrum(time, residual)
             right.loglog(frequency, density, color=COLOURS["orange"], lw=0.9)
             right.set(ylabel=f"{unit}/\N{SQUARE ROOT}Hz")
         axes[0][0].legend(loc="upper right")

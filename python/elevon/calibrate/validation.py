@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
@@ -223,13 +223,13 @@ def validate(
     InputError
         No position, a transient longer than a log, a threshold for a signal that is not compared.
     """
-    limits, offsets = _promised(actuator, "limits"), _promised(actuator, "offsets")
+    limits, offsets = (promised(actuator, key, SIGNALS) for key in ("limits", "offsets"))
     if not logs:
         raise InputError("validation needs at least one log")
     logs = [drive_log(log) for log in logs]
     given = transient
     if given is None:
-        given = float((actuator.validation or {}).get("transient", TRANSIENT))
+        given = promised_transient(actuator, None, TRANSIENT)
         shortest = min(log.duration for log in logs)
         given = given if given < shortest else 0.5 * shortest
     errors: list[SignalError] = []
@@ -237,8 +237,6 @@ def validate(
     for k, log in enumerate(logs):
         if progress is not None and not progress(k / len(logs)):
             raise Interrupted("validation stopped")
-        if not given < log.duration:
-            raise InputError(f"transient of {given:g} s: {log.name} lasts {log.duration:g} s")
         trace, commands[log.name] = _trace(log, actuator, fidelity, given, offsets)
         traces.append(trace)
         if log.brake.known in _UNMEASURED:
@@ -251,13 +249,27 @@ def validate(
     )
 
 
-def _promised(actuator: Actuator, key: str) -> dict[str, float]:
-    """One table of the actuator file's ``[validation]``, its signals checked."""
-    limits = dict((actuator.validation or {}).get(key, {}))
-    for name in limits:
-        if name not in SIGNALS:
-            raise unknown("signal", name, SIGNALS, f"{actuator.name}: validation.{key}")
-    return limits
+def promised(
+    actuator: Actuator, what: str, known: Collection[str] | None = None
+) -> dict[str, float]:
+    """Return ``limits`` or ``offsets`` of an actuator file, by signal.
+
+    Raises
+    ------
+    UnknownNameError
+        One of a signal that is not among those known.
+    """
+    table = dict((actuator.validation or {}).get(what, {}))
+    for name in table:
+        if known is not None and name not in known:
+            raise unknown("signal", name, known, f"{actuator.name}: validation.{what}")
+    return table
+
+
+def promised_transient(actuator: Actuator, given: float | None, default: float) -> float:
+    """Return the seconds left out of a log: as given, else as the actuator file or the default."""
+    stated = (actuator.validation or {}).get("transient", default)
+    return float(stated) if given is None else given
 
 
 def _trace(
@@ -267,14 +279,13 @@ def _trace(
     transient: float,
     offsets: Mapping[str, float],
 ) -> tuple[ValidationTrace, str]:
-    experiment, how = bench_experiment(log, actuator, fidelity)
+    late, (experiment, how) = log.after(transient), bench_experiment(log, actuator, fidelity)
     run = next(experiment.run()).seen(log)
     logged = (log.output, log.speed, log.current)
     measured = {
         name: values - offsets.get(name, 0.0) for name, values in zip(SIGNALS, logged, strict=True)
     }
-    used = log.good & (log.time >= transient)
-    return ValidationTrace(log.name, log.time, measured, run.channels, used), how
+    return ValidationTrace(log.name, log.time, measured, run.channels, late.good), how
 
 
 def bench_experiment(

@@ -260,32 +260,40 @@ class _Balances:
         ]
 
     def _held_out(self, result: Calibration, request: CalibrationRequest) -> Calibration:
-        """Thresholds of the actuator file, from motions held out where there are several."""
-        from elevon.calibrate.parts_held_out import held_out_logs
-        from elevon.calibrate.stages import calibrate_parts
+        """Thresholds of the actuator file, from motions held out where there are several.
 
-        by_name = {log.name: log for log in self.given}
+        A single motion, or one without which too little is determined, is held against the values
+        of all.
+        """
         names = self._predicted(result.before)
         if not names:
             return _with(result, "no thresholds: no log of a motion to be predicted")
-        fidelity = (request.fidelity or "auto") if self.unit else "auto"
-
-        def without(name: str) -> Actuator:
-            others = [log for log in by_name.values() if log.name != name and _ends(log) < _LONG]
-            read = self._read(others, result.before)
-            return calibrate_parts(
-                read, result.before, free=request.free, fidelity=fidelity
-            ).actuator
-
-        def validated(name: str, fitted: Actuator, progress: Progress | None) -> Validation:
-            way = replace(self, given=[by_name[name]])
-            return way.validate(fitted, ValidationRequest(), progress)
-
+        apart, judged = len(names) > 1, []
         try:
-            promise, apart = held_out_logs(names, result.actuator, without, validated)
+            for name in names:
+                model = self._without(name, result.before, request) if apart else None
+                apart = model is not None
+                way = replace(self, given=[log for log in self.given if log.name == name])
+                fitted = result.actuator if model is None else model
+                judged.append(way.validate(fitted, ValidationRequest(), None))
         except ElevonError as error:
             return _with(result, f"no thresholds: {error}")
+        errors = tuple(row for item in judged for row in item.errors)
+        how = {log: text for item in judged for log, text in item.commands.items()}
+        promise = replace(judged[0], errors=errors, traces=(), commands=how)
         return _with(replace(result, promise=promise), *([] if apart else [_FROM_THE_FIT]))
+
+    def _without(self, name: str, before: Actuator, request: CalibrationRequest) -> Actuator | None:
+        """Return the actuator calibrated from all other logs; None: they determine too little."""
+        from elevon.calibrate.stages import calibrate_parts
+
+        others = [log for log in self.given if log.name != name and _ends(log) < _LONG]
+        fidelity = (request.fidelity or "auto") if self.unit else "auto"
+        try:
+            read = self._read(others, before)
+            return calibrate_parts(read, before, free=request.free, fidelity=fidelity).actuator
+        except InputError:
+            return None
 
     def validate(
         self, actuator: Actuator, request: ValidationRequest, progress: Progress | None

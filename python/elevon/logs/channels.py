@@ -35,10 +35,10 @@ def examine_channels(recording: Recording, ratio: float | None, report: ImportRe
     for name, data in values.items():
         missing = int(np.isnan(data).sum())
         if missing == len(data):
-            report.warn(name, "empty", "no value at all")
+            report.say(name, "empty")
             continue
         if missing:
-            report.warn(name, "missing", f"{missing} of {len(data)} samples are missing")
+            report.say(name, "missing", missing, len(data))
         _constant(name, data, values, report)
         if roles.get(name) in _CLIPPING:
             _clipping(name, data, report, limited=roles[name] == "speed_ref")
@@ -55,9 +55,9 @@ def _constant(name: str, data: Floats, values: Mapping[str, Floats], report: Imp
     )
     if good.size > 1 and np.ptp(good) == 0.0 and moved:
         if name == "trigger":
-            report.note(name, "no-edge", f"the trigger stays at {good[0]:g}")
+            report.say(name, "no-edge", good[0])
         else:
-            report.warn(name, "stuck", f"stands at {good[0]:.6g} through the whole log")
+            report.say(name, "stuck-throughout", good[0])
 
 
 def _clipping(name: str, data: Floats, report: ImportReport, *, limited: bool) -> None:
@@ -66,15 +66,9 @@ def _clipping(name: str, data: Floats, report: ImportReport, *, limited: bool) -
         if share <= _CLIP_SHARE or value == 0.0:
             continue
         if limited and abs(abs(value) - SPEED_LIMIT) < 0.01 * SPEED_LIMIT:
-            report.note(
-                name,
-                "saturated",
-                f"at its limit of {np.sign(value) * 500:g} rpm for {100 * share:.1f} % of the log",
-            )
+            report.say(name, "saturated", np.sign(value) * 500, 100 * share)
         else:
-            report.warn(
-                name, "clipped", f"{100 * share:.1f} % of the samples sit at {value:.6g} in runs"
-            )
+            report.say(name, "clipped", 100 * share, value)
 
 
 def _stuck(recording: Recording, ratio: float, report: ImportReport) -> None:
@@ -85,4 +79,4 @@ def _stuck(recording: Recording, ratio: float, report: ImportReport) -> None:
     motor, output = inner.values[both] / ratio, outer.values[both]
     for name, data, drive in ((outer.name, output, motor), (inner.name, motor, output)):
         for start, end in stuck_spans(outer.time[both], data, drive, _FREE_TRAVEL)[:10]:
-            report.warn(name, "stuck", f"stands still from {start:.3f} s to {end:.3f} s")
+            report.say(name, "stuck", start, end)

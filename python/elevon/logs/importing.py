@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -109,20 +108,16 @@ def import_log(
     """
     if log_format in {"auto", "recording"}:
         saved = _saved(path, log_format)
-        if saved is not None and command is not None:
-            return dataclasses.replace(saved, note=read_command_note(command))
         if saved is not None:
-            return saved
+            return saved if command is None else replace(saved, note=read_command_note(command))
     near_cell, near_note = find_sidecars(path) if sidecars else (None, None)
     note_path = command or near_note
-    note = read_command_note(note_path) if note_path is not None else None
-    mapped = column_map
-    if mapped is not None and not isinstance(mapped, ColumnMap):
-        mapped = find_map(mapped)
+    note = None if note_path is None else read_command_note(note_path)
+    mapped = find_map(column_map) if isinstance(column_map, (str, Path)) else column_map
     table = read_table(path, log_format, limits)
     report = ImportReport(str(path), table.file_format)
     for text in table.notes:
-        report.note("file", "format", text)
+        report.say("file", "format", text)
     if gear_ratio is None and mapped is None and note is not None:
         gear_ratio = note.gear_ratio
     ratio = gear_ratio_of(gear_ratio, mapped, table, log_format)
@@ -136,7 +131,6 @@ def import_log(
     cell = loadcell or near_cell
     if cell is not None:
         recording = join_loadcell(recording, cell, note, report, limits, gear_ratio=ratio)
-    _note_findings(note, report)
     meta = _meta(path, report, note, ratio, convention)
     return ImportedLog(recording.with_meta(**meta), report, note)
 
@@ -167,7 +161,7 @@ def _saved(path: str | Path, log_format: str) -> ImportedLog | None:
     report = ImportReport(str(path), "recording")
     for name, clock in recording.clocks.items():
         quality = clock_quality(f"{path}, clock {name}", np.asarray(clock.time))
-        report.clocks[name] = _clock_facts(quality)
+        report.clocks[name] = quality.to_dict()
     for channel in recording.channels:
         report.channels.append(_channel_facts(channel.name, channel.name, channel.values, channel))
     report.clocks.setdefault("drive", next(iter(report.clocks.values()), {}))
@@ -240,20 +234,13 @@ def _clock(
     base = assigned["time"]
     seconds = table.columns[base.column] * (base.factor or 1.0)
     quality = clock_quality(table.source, seconds)
-    report.clocks["drive"] = _clock_facts(quality)
+    report.clocks["drive"] = quality.to_dict()
     if quality.duplicates:
-        report.warn(
-            "drive",
-            "duplicates",
-            f"{quality.duplicates} rows repeat a time stamp: the first of each stays, the "
-            "others are left out",
-        )
-    for start, end, missing in quality.gaps[:20]:
-        report.warn(
-            "drive", "gap", f"{missing} samples missing between {start:.4f} and {end:.4f} s"
-        )
+        report.say("drive", "duplicates", quality.duplicates)
+    for gap in quality.gaps[:20]:
+        report.say("drive", "gap", *gap)
     if 1e3 * quality.jitter_max > _ROUNDING and quality.jitter_max > 0.25 * quality.period:
-        report.warn("drive", "jitter", f"time stamps stray up to {1e3 * quality.jitter_max:.3g} ms")
+        report.say("drive", "jitter", 1e3 * quality.jitter_max)
     return quality, seconds[quality.keep]
 
 
@@ -274,15 +261,10 @@ def settle_currents(
         )
     convention = conventions.pop() if conventions else "rms"
     changed = rms_to_peak(assigned) if convention == "rms" else []
-    if changed and not (mapped and mapped.current) and not (note and note.current):
-        report.warn(
-            "currents",
-            "convention-assumed",
-            f"{', '.join(changed)}: taken as rms and turned into peak; state it in the command "
-            "note or the map",
-        )
-    elif changed:
-        report.note("currents", "convention", f"{', '.join(changed)}: rms turned into peak")
+    stated = (mapped and mapped.current) or (note and note.current)
+    if changed:
+        name = "convention" if stated else "convention-assumed"
+        report.say("currents", name, ", ".join(changed))
     return convention
 
 
@@ -325,26 +307,6 @@ def _channel_facts(name: str, column: str, values: Any, channel: Any) -> dict[st
     }
 
 
-def _clock_facts(quality: ClockQuality) -> dict[str, Any]:
-    return {
-        "samples": quality.samples,
-        "duration_s": quality.duration,
-        "rate_hz": quality.rate,
-        "period_s": quality.period,
-        "jitter_rms_s": quality.jitter_rms,
-        "jitter_max_s": quality.jitter_max,
-        "gaps": [list(gap) for gap in quality.gaps],
-        "duplicates": quality.duplicates,
-    }
-
-
-def _note_findings(note: CommandNote | None, report: ImportReport) -> None:
-    if note is None:
-        return
-    for key in note.ignored:
-        report.warn("command", "key-ignored", f"{note.source}: {key!a} means nothing here")
-
-
 def _meta(
     path: str | Path,
     report: ImportReport,
@@ -354,6 +316,9 @@ def _meta(
 ) -> dict[str, Any]:
     if not report.channels:
         raise FormatError(f"{path}: no channel")
+    if note is not None:
+        for key in note.ignored:
+            report.say("command", "key-ignored", note.source, key)
     return {
         "status": "measured",
         "log": Path(path).name,

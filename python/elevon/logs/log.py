@@ -243,6 +243,18 @@ class Log:
         """Return the log with fewer samples that count."""
         return replace(self, good=self.good & keep)
 
+    def after(self, transient: float) -> Log:
+        """Return the log in which what comes before an instant [s] does not count.
+
+        Raises
+        ------
+        InputError
+            No instant of the log.
+        """
+        if not 0.0 <= transient < self.duration:
+            raise InputError(f"transient of {transient:g} s: {self.name} lasts {self.duration:g} s")
+        return self.counting(self.time >= transient)
+
     def part(self, keep: Bools, first: float, last: float) -> Log:
         """Return the samples between two instants [s] as a log of its own, from zero."""
         brake = self.brake

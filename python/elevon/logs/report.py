@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
+from elevon.data import packaged_toml
 from elevon.plain import Plain, key
 
 Level = Literal["info", "warning"]
@@ -47,13 +48,11 @@ class ImportReport(Plain):
     findings: list[Finding] = field(default_factory=list)
     synchronisation: dict[str, Any] | None = None
 
-    def note(self, place: str, code: str, text: str) -> None:
-        """Add a fact."""
-        self.findings.append(Finding("info", place, code, text))
-
-    def warn(self, place: str, code: str, text: str) -> None:
-        """Add something the caller should look at."""
-        self.findings.append(Finding("warning", place, code, text))
+    def say(self, place: str, name: str, *values: object) -> None:
+        """Add a finding of ``findings.toml``, with the values that its text has places for."""
+        known = packaged_toml("elevon.logs", "findings.toml")[name]
+        level, text = known.get("level", "warning"), known["text"].format(*values)
+        self.findings.append(Finding(level, place, known.get("code", name), text))
 
     def has(self, code: str) -> bool:
         """Whether a finding of this code was made."""

@@ -55,6 +55,14 @@ class ReportTable:
     formats: Sequence[str] = ()
     folded: str = ""
 
+    @classmethod
+    def of(
+        cls, rows: Sequence[Mapping[str, object]], caption: str = "", *, digits: int = 5
+    ) -> ReportTable:
+        """Return a table of rows that state their headings, all the same."""
+        columns = list(rows[0]) if rows else []
+        return cls(columns, [list(row.values()) for row in rows], caption, digits)
+
     def cell(self, value: object, column: int = 0) -> str:
         """Return the text of one cell."""
         wanted = self.formats[column] if column < len(self.formats) else ""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 from elevon.actuator import Actuator
 from elevon.calibrate.named import named
 from elevon.calibrate.stages.log import motor_ratio
+from elevon.data import packaged_toml
 from elevon.errors import InputError, Interrupted
 from elevon.estimate import Estimate
 from elevon.logs.log import Log
@@ -22,6 +23,7 @@ _NOISE = "the logs' noise is larger than its effect"
 _IMPOSSIBLE = "the value that the logs say is none that the model can have"
 
 
+@dataclass(eq=False)
 class Context:
     """What a calibration knows as its stages go on.
 
@@ -48,22 +50,15 @@ class Context:
         What else is known, plain types.
     """
 
-    def __init__(
-        self,
-        logs: Sequence[Log],
-        actuator: Actuator,
-        *,
-        fidelity: str | None = "auto",
-        progress: Progress | None = None,
-    ) -> None:
-        self.logs = tuple(logs)
-        self.actuator = actuator
-        self.fidelity = fidelity
-        self.progress = progress
-        self.levels: dict[str, Estimate] = {}
-        self.reasons: dict[str, str] = {}
-        self.given: dict[str, tuple[str, ...]] = {}
-        self.facts: dict[str, Any] = {}
+    logs: Sequence[Log]
+    actuator: Actuator
+    _: KW_ONLY
+    fidelity: str | None = "auto"
+    progress: Progress | None = None
+    levels: dict[str, Estimate] = field(default_factory=dict, init=False)
+    reasons: dict[str, str] = field(default_factory=dict, init=False)
+    given: dict[str, tuple[str, ...]] = field(default_factory=dict, init=False)
+    facts: dict[str, Any] = field(default_factory=dict, init=False)
 
     def go(self, fraction: float) -> None:
         """Report progress; stop where it says so."""
@@ -169,6 +164,12 @@ class Stage(Generic[C]):
     needs: str
     gives: str
     run: Callable[[C], None]
+
+
+def stages_of(flow: str, runs: Mapping[str, Callable[[C], None]]) -> tuple[Stage[C], ...]:
+    """Return the stages of a flow; what each needs and gives stands in ``stages.toml``."""
+    rows = packaged_toml("elevon.calibrate.stages", "stages.toml")[flow]
+    return tuple(Stage(name, run=run, **rows[name]) for name, run in runs.items())
 
 
 def run_stages(stages: Sequence[Stage[C]], context: C, first: float, last: float) -> None:

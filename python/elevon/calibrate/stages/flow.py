@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from elevon.actuator import Actuator
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
 from elevon.calibrate.stages import lock, loops, motor, rig, screw
-from elevon.calibrate.stages.context import Context, Stage, run_stages
+from elevon.calibrate.stages.context import Context, run_stages, stages_of
 from elevon.calibrate.stages.drive import drive
 from elevon.calibrate.stages.heat import heat
 from elevon.calibrate.stages.loops_by_current import loops_by_current
@@ -25,33 +25,12 @@ _UNIT = "control.gain_extension"  # an actuator with a control unit of its own h
 _PRELOAD = "screw.efficiency_aiding"  # a preloaded screw has it
 
 
-STAGES = (
-    Stage("rig", _UNIT, "load_cell while a rig moves the ram both ways at several speeds",
-          "friction tables, harmonics, detent, hanging mass", rig.friction),
-    Stage("speed control", _UNIT, "speed_ref, torque_voltage below the supply's limit",
-          "gain and zero by direction", loops.unit_gains),
-    Stage("set points", _UNIT, "speed_ref of a motion", "ramp and speeds", loops.set_points),
-    Stage("drive", _UNIT, "torque_current, motor_speed, load of a motion under drive",
-          "motor, train, inertia; runs of the motions correct them", drive),
-    Stage("lock", _UNIT, "state of the lock, or its switch, and the ram's position",
-          "travels of the lock", lock.travels),
-    Stage("brake", _UNIT, "a rig against the set brake; the brake's switch",
-          "torque and delays", lock.brake),
-    Stage("motor", _PRELOAD, "torque_voltage, torque_current in motion",
-          "voltage constant, resistance", motor.motor_constants),
-    Stage("load side", _PRELOAD, "load and load_cell in motion",
-          "mass, damping, friction of the load", motor.load_side),
-    Stage("torque", _PRELOAD, "torque_current, load in motion both ways",
-          "inertia, friction, preload, efficiencies", screw.torque),
-    Stage("position loop", _PRELOAD, "command, motor_position, speed_ref",
-          "gain, feed-forward", loops.position_loop),
-    Stage("speed loop", _PRELOAD, "speed_ref, current_ref", "gain, integral time",
-          loops.speed_control),
-    Stage("loops by current", _PRELOAD, "command, motor_position, torque_current",
-          "gains where no set point was logged", loops_by_current),
-    Stage("heat", _PRELOAD, "temperatures over minutes", "thermal networks", heat),
-)  # fmt: skip
-#: Parameters that state which table of `unseen.toml` holds.
+STAGES = stages_of("parts", {
+    "rig": rig.friction, "speed control": loops.unit_gains, "set points": loops.set_points,
+    "drive": drive, "lock": lock.travels, "brake": lock.brake, "motor": motor.motor_constants,
+    "load side": motor.load_side, "torque": screw.torque, "position loop": loops.position_loop,
+    "speed loop": loops.speed_control, "loops by current": loops_by_current, "heat": heat,
+})  # fmt: skip
 _KINDS = {_UNIT: "unit", _PRELOAD: "preload"}
 
 

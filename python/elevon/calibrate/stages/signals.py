@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from elevon.actuator import Actuator
 from elevon.calibrate.acceptance import accept, missing
 from elevon.calibrate.balance import torque_balance
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
@@ -20,20 +19,20 @@ from elevon.calibrate.plant import (
     static_estimate,
     torque_scale,
 )
-from elevon.calibrate.stages.context import Context, Stage
+from elevon.calibrate.stages.context import Context, stages_of
 from elevon.calibrate.static import static_friction
 from elevon.calibrate.zeros import gain_estimate, position_estimates
 from elevon.errors import InputError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression
 from elevon.logs.log import Log
-from elevon.progress import Progress, part
+from elevon.progress import part
 
 _DOUBTFUL = 0.2  # share of the current below which a regression explains nothing
-_ENCODER = "sensor.encoder.wheel_ratio"  # an actuator with an encoder on its output shaft has it
 _RUNS = (0.35, 0.8)  # of the work: model runs
 
 
+@dataclass(eq=False, kw_only=True)
 class DriveContext(Context):
     """What the stages of a drive's logs share beside the estimates.
 
@@ -70,26 +69,20 @@ class DriveContext(Context):
         Identifiability and the fit of model runs.
     """
 
-    def __init__(  # noqa: PLR0917 - what the caller states
-        self,
-        logs: Sequence[Log],
-        used: Sequence[Log],
-        actuator: Actuator,
-        free: Sequence[str] | None,
-        per_log: Sequence[str],
-        fidelity: str | None,
-        progress: Progress | None,
-    ) -> None:
-        super().__init__(logs, actuator, fidelity=fidelity, progress=progress)
-        self.used, self.free, self.per_log = used, free, per_log
-        self.plant: Regression | None = None
-        self.law: Regression | None = None
-        self.torque: Torque = torque_scale(actuator, None)
-        self.followed: dict[str, float] = {}
-        self.commands: list[CommandFit] = []
-        self.findings: list[str] = []
-        self.accepted: list[Estimate] = []
-        self.dynamic: Dynamic | None = None
+    used: Sequence[Log]
+    free: Sequence[str] | None
+    per_log: Sequence[str]
+    torque: Torque = field(init=False)
+    plant: Regression | None = field(default=None, init=False)
+    law: Regression | None = field(default=None, init=False)
+    followed: dict[str, float] = field(default_factory=dict, init=False)
+    commands: list[CommandFit] = field(default_factory=list, init=False)
+    findings: list[str] = field(default_factory=list, init=False)
+    accepted: list[Estimate] = field(default_factory=list, init=False)
+    dynamic: Dynamic | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self.torque = torque_scale(self.actuator, None)
 
     def put(self, estimates: Iterable[Estimate]) -> None:
         """Take over estimates, the loose ones too."""
@@ -178,17 +171,7 @@ def _runs(ctx: DriveContext) -> None:
         raise InputError("the logs determine no parameter: nothing in them moves enough")
 
 
-DRIVE_STAGES = (
-    Stage("positions", _ENCODER, "motor_position, output_position past a reversal; motor_speed",
-          "backlash, encoder, speed sensor, speed limit", _positions),
-    Stage("torque balance", _ENCODER, "torque_current, motor_speed in both directions",
-          "its regression", _torque),
-    Stage("controller's law", _ENCODER, "speed_ref, motor_speed, current inside the limits",
-          "its regression", _controller),
-    Stage("numbers", _ENCODER, "the two regressions; reversals with a standstill or a creep",
-          "inertia, friction (static too), torque constant, gains, sensors", _numbers),
-    Stage("command", _ENCODER, "speed_ref, output_position under a known waveform",
-          "position gain", _command),
-    Stage("model runs", _ENCODER, "speed_ref, motor_speed, torque_current",
-          "what the regressions cannot see; what absorbs the model's misfit", _runs),
-)  # fmt: skip
+DRIVE_STAGES = stages_of("drive", {
+    "positions": _positions, "torque balance": _torque, "controller's law": _controller,
+    "numbers": _numbers, "command": _command, "model runs": _runs,
+})  # fmt: skip

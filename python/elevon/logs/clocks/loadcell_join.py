@@ -52,25 +52,19 @@ def join_loadcell(
     """
     log = read_loadcell(path, limits=limits)
     for text in log.notes:
-        report.note("load_cell", "format", text)
+        report.say("load_cell", "format", text)
     quality = clock_quality(str(path), log.time)
     if quality.duplicates:
-        report.warn(
-            "load_cell", "duplicates", f"{quality.duplicates} repeated time stamps left out"
-        )
-    for start, end, missing in quality.gaps[:20]:
-        report.warn("load_cell", "gap", f"{missing} samples missing, {start:.3f} to {end:.3f} s")
+        report.say("load_cell", "duplicates-cell", quality.duplicates)
+    for gap in quality.gaps[:20]:
+        report.say("load_cell", "gap-cell", *gap)
     time, value = log.time[quality.keep], log.value[quality.keep]
     choices = _shared(recording, gear_ratio, note)
     fit = _synchronise(recording, choices, time, value, report)
     moved = time if fit is None else fit.to_first(time)
+    facts = quality.to_dict()
     report.clocks["load_cell"] = {
-        "samples": quality.samples,
-        "duration_s": quality.duration,
-        "rate_hz": quality.rate,
-        "jitter_rms_s": quality.jitter_rms,
-        "gaps": [list(gap) for gap in quality.gaps],
-        "duplicates": quality.duplicates,
+        name: facts[name] for name in facts if name not in {"period_s", "jitter_max_s"}
     }
     _check_overlap(recording, moved, report)
     values, units = _channels(log, value, note, report)
@@ -92,19 +86,17 @@ def _synchronise(
     if "trigger" in recording.roles:
         edge = find_trigger(drive, recording.role("trigger").values)
         if edge is not None and edge.later:
-            report.note(
-                "trigger", "more-edges", f"{edge.later} changes after the first; the first is used"
-            )
+            report.say("trigger", "more-edges", edge.later)
     try:
         if not choices:
             raise InputError("synchronisation: the log holds no current, no speed, no positions")
         fit = align_clocks(drive, choices[0], time, value, edge=edge, alternatives=choices[1:])
     except InputError as error:
         if edge is None:
-            report.warn("load_cell", "not-synchronised", f"{error}; its clock stays its own")
+            report.say("load_cell", "not-synchronised", error)
             report.synchronisation = {"method": "none"}
             return None
-        report.note("load_cell", "trigger-alone", f"{error}")
+        report.say("load_cell", "trigger-alone", error)
         fit = ClockFit(edge.time, edge.std, 0.0, math.inf, "trigger", math.nan)
     _fit_findings(fit, report)
     report.synchronisation = {
@@ -127,32 +119,13 @@ def _finite(value: float) -> float | None:
 def _fit_findings(fit: ClockFit, report: ImportReport) -> None:
     """Say what the two logs could not settle."""
     if fit.refused is not None:
-        report.note(
-            "load_cell",
-            "drift-unknown",
-            f"clock drift {fit.refused[0]:.2e} is known only to {fit.refused[1]:.1e}, little "
-            f"better than a resonator keeps ({RESONATOR_STD:.1e}): not applied",
-        )
+        report.say("load_cell", "drift-unknown", *fit.refused, RESONATOR_STD)
     elif not math.isfinite(fit.drift_std):
-        report.note(
-            "load_cell",
-            "drift-unknown",
-            "nothing that both logs saw determines the drift: the trigger fixes the offset only",
-        )
+        report.say("load_cell", "drift-undetermined")
     if abs(fit.drift) - 2.0 * fit.drift_std > RESONATOR_TOLERANCE:
-        report.warn(
-            "load_cell",
-            "drift-large",
-            f"clock drift {fit.drift:.2e}, known to {fit.drift_std:.1e}: more than a ceramic "
-            f"resonator may be off ({RESONATOR_TOLERANCE:g})",
-        )
+        report.say("load_cell", "drift-large", fit, RESONATOR_TOLERANCE)
     if fit.set_aside is not None:
-        report.warn(
-            "load_cell",
-            "offset-assumed",
-            f"no trigger: {fit.offset:.3f} s has the load cell begin within the drive's trace; "
-            f"{fit.set_aside:.3f} s, before it, cannot be distinguished from it by what both saw",
-        )
+        report.say("load_cell", "offset-assumed", fit)
 
 
 def _shared(
@@ -209,9 +182,9 @@ def _check_overlap(recording: Recording, time: Floats, report: ImportReport) -> 
     drive = recording.clocks["drive"].time
     outside = float(np.mean((time < drive[0]) | (time > drive[-1])))
     if outside == 1.0:
-        report.warn("load_cell", "no-overlap", "no sample falls inside the drive's trace")
+        report.say("load_cell", "no-overlap")
     elif outside > 0.0:
-        report.note("load_cell", "overlap", f"{100 * outside:.1f} % lies outside the drive's trace")
+        report.say("load_cell", "overlap", 100 * outside)
 
 
 def _channels(
@@ -221,10 +194,10 @@ def _channels(
         return {"load_cell_torque": value}, {"load_cell_torque": "N m"}
     values, units = {"load_cell_force": value}, {"load_cell_force": "N"}
     if note is None or note.load_cell_arm is None:
-        report.note("load_cell", "no-arm", "arm not stated: force only, no torque")
+        report.say("load_cell", "no-arm")
         return values, units
     factor = note.load_cell_arm / (note.chain_ratio or 1.0)
     values["load_cell_torque"], units["load_cell_torque"] = value * factor, "N m"
     shaft = "the motor shaft" if note.chain_ratio else "the shaft the arm belongs to"
-    report.note("load_cell_torque", "torque", f"force x {factor:.6g} m, on {shaft}")
+    report.say("load_cell_torque", "torque", factor, shaft)
     return values, units

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Bools, Floats
 from elevon.errors import FormatError
+from elevon.plain import WORKING, Plain, key
 
 IntArray = npt.NDArray[np.intp]
 _GAP = 1.5  # an interval longer than this many periods is a gap
@@ -16,7 +18,7 @@ _RUN = 5  # samples in a row at the extreme that make clipping
 
 
 @dataclass(frozen=True, slots=True)
-class ClockQuality:
+class ClockQuality(Plain):
     """The clock of a log.
 
     Attributes
@@ -40,14 +42,14 @@ class ClockQuality:
     """
 
     samples: int
-    duration: float
-    period: float
-    rate: float
-    jitter_rms: float
-    jitter_max: float
+    duration: Annotated[float, key("duration_s")]
+    rate: Annotated[float, key("rate_hz")]
+    period: Annotated[float, key("period_s")]
+    jitter_rms: Annotated[float, key("jitter_rms_s")]
+    jitter_max: Annotated[float, key("jitter_max_s")]
     gaps: tuple[tuple[float, float, int], ...]
     duplicates: int
-    keep: IntArray
+    keep: Annotated[IntArray, WORKING]
 
 
 def clock_quality(source: str, time: Floats) -> ClockQuality:

@@ -76,7 +76,7 @@ def check_agreement(
                 f"{report.source}: the map contradicts the data: {text}; "
                 "check unit, scale, sign and ratio of both columns"
             )
-        report.warn(role, "disagrees", f"{text}: unit, sign or scale of one of them is wrong")
+        report.say(role, "disagrees", text)
 
 
 def slope_and_fit(x: Floats, y: Floats) -> tuple[float, float]:

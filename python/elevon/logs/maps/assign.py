@@ -242,11 +242,9 @@ def _add_extra(assigned: dict[str, Assignment], table: RawTable, report: ImportR
             continue
         signal = safe_name(name, set(assigned))
         stated = table.units.get(name, "")
-        report.note(
-            signal, "extra-column", f"column {quoted(name)} is not known; left as it stands"
-        )
+        report.say(signal, "extra-column", quoted(name))
         if stated:
-            report.note(signal, "extra-unit", f"its unit, as the file says: {quoted(stated)}")
+            report.say(signal, "extra-unit", quoted(stated))
         assigned[signal] = Assignment(signal, name, 1.0, "1")
 
 

@@ -94,12 +94,8 @@ def settle_motor(
             f"motor speed, which is no known unit ({_listed(motor_candidates())}); give unit and "
             "scale in a column map"
         )
-    report.note(
-        name,
-        "unit-confirmed",
-        f"{statement.column} is in {candidate.unit}: it moves {slope / candidate.scale:.4f} of the "
-        "integrated speed",
-    )
+    moved = slope / candidate.scale
+    report.say(name, "unit-confirmed", statement.column, candidate.unit, moved)
     return 1.0 / candidate.scale, True
 
 
@@ -157,12 +153,7 @@ def settle_encoder(
     follows = f"gear ratio seen {seen:.3f}, expected {ratio:g}"
     if candidate.shaft == "fast":  # the drive has multiplied by its own ratio: it cannot be seen
         follows = f"it moves {fit.slope / candidate.scale:.4f} of the motor"
-    report.note(
-        name,
-        "shaft-confirmed",
-        f"{statement.column} is on the {candidate.shaft} shaft in {candidate.unit}: {follows}; "
-        f"backlash about {backlash:.3f} deg at the output",
-    )
+    report.say(name, "shaft-confirmed", statement.column, candidate, follows, backlash)
     return 1.0 / (candidate.scale * ratio), True
 
 
@@ -231,14 +222,10 @@ def _unconfirmed(
     statement: PositionStatement, name: str, why: str, report: ImportReport, ratio: float = 1.0
 ) -> float:
     if statement.per_rad is not None:
-        report.warn(name, "unit-unconfirmed", f"{statement.column}: unit as stated, {why}")
+        report.say(name, "unit-unconfirmed", statement.column, why)
         return 1.0 / statement.per_rad
     shaft = ", on the motor shaft" if ratio > 1.0 else ""
-    report.warn(
-        name,
-        "unit-unconfirmed",
-        f"{statement.column}: taken as degrees{shaft}, {why}; state it in a column map",
-    )
+    report.say(name, "unit-assumed", statement.column, shaft, why)
     return math.pi / 180.0 / ratio
 
 

@@ -9,8 +9,14 @@ from elevon.calibrate.stages.closed_loop.fit import Fitted, parts_apart, refitte
 from elevon.calibrate.stages.closed_loop.free import STICK, in_set
 from elevon.calibrate.stages.closed_loop.log import NAMES
 from elevon.calibrate.stages.closed_loop.model import LoopModel
-from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
-from elevon.errors import InputError, unknown
+from elevon.calibrate.validation import (
+    SignalError,
+    Validation,
+    ValidationTrace,
+    promised,
+    promised_transient,
+)
+from elevon.errors import InputError
 from elevon.estimate.free import outer
 from elevon.logs.log import Log
 
@@ -125,17 +131,11 @@ def validate_loop(
     InputError
         A transient longer than a log, a threshold of a channel that is none.
     """
-    promised, units = actuator.validation or {}, units_of(actuator.wiring)
-    limits = dict(promised.get("limits", {}))
-    offsets = dict(promised.get("offsets", {}) if logger is None else logger)
-    for name in limits:
-        if name not in units:
-            raise unknown("signal", name, units, f"{actuator.name}: validation.limits")
-    given = float(promised.get("transient", TRANSIENT)) if transient is None else transient
-    for log in logs:
-        if not given < log.duration:
-            raise InputError(f"transient of {given:g} s: {log.name} lasts {log.duration:g} s")
-    late = [log.counting(log.time >= given) for log in logs]
+    units = units_of(actuator.wiring)
+    limits = promised(actuator, "limits", units)
+    offsets = promised(actuator, "offsets") if logger is None else dict(logger)
+    given = promised_transient(actuator, transient, TRANSIENT)
+    late = [log.after(given) for log in logs]
     _, traces = predict(late, actuator, {f"sensor.{name}": v for name, v in offsets.items()})
     return Validation(
         actuator.name, "low", given,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from elevon.calibrate.stages.closed_loop.free import CURRENT_GAIN, STICK, STRUCT
 from elevon.calibrate.stages.closed_loop.intervals import Knowledge, Silence, known
 from elevon.calibrate.stages.closed_loop.predict import held_out_errors, traces_of, units_of
 from elevon.calibrate.stages.closed_loop.refine import refined
-from elevon.calibrate.stages.context import Context, Stage, run_stages
+from elevon.calibrate.stages.context import Context, run_stages, stages_of
 from elevon.calibrate.validation import SignalError, Validation
 from elevon.errors import InputError, unknown
 from elevon.estimate import Estimate, quantile
@@ -81,7 +82,11 @@ def calibrate_loop(
     """
     begin = clock.perf_counter()
     _check(logs, actuator, structure)
-    context = LoopContext(_late(logs, transient), actuator, structure, free, seed, progress)
+    late = list(logs) if transient is None else [log.after(transient) for log in logs]
+    context = LoopContext(
+        late, actuator, structure=structure, free=free, seed=seed,
+        progress=progress,
+    )  # fmt: skip
     run_stages(LOOP_STAGES, context, 0.0, 1.0)
     fitted = context.fitted
     context.go(1.0)
@@ -97,6 +102,7 @@ def calibrate_loop(
     )
 
 
+@dataclass(eq=False, kw_only=True)
 class LoopContext(Context):
     """What a calibration in closed loop knows as its stages go on.
 
@@ -120,37 +126,32 @@ class LoopContext(Context):
         What the logs follow alike with two values, and why.
     estimates : list of Estimate
         What is determined.
+    fraction : float
+        Of the work, that was told last.
     """
 
-    servo: Actuator
-    chosen: Searched
-    fitted: Fitted
-    promise: Validation
-    estimates: list[Estimate]
+    structure: str | None
+    free: Sequence[str] | None
+    seed: int
+    servo: Actuator = field(init=False)
+    chosen: Searched = field(init=False)
+    fitted: Fitted = field(init=False)
+    promise: Validation = field(init=False)
+    unsettled: dict[str, str] = field(default_factory=dict, init=False)
+    estimates: list[Estimate] = field(init=False)
+    fraction: float = field(default=0.0, init=False)
 
-    def __init__(  # noqa: PLR0917 - what the caller states
-        self,
-        logs: Sequence[Log],
-        actuator: Actuator,
-        structure: str | None,
-        free: Sequence[str] | None,
-        seed: int,
-        progress: Progress | None,
-    ) -> None:
-        super().__init__(logs, actuator, progress=progress)
-        self.structure, self.free, self.seed = structure, free, seed
-        self.servo = actuator
-        self.unsettled: dict[str, str] = {}
-        self._fraction = 0.0
+    def __post_init__(self) -> None:
+        self.servo = self.actuator
 
     def go(self, fraction: float) -> None:
         """Report progress, which never falls; stop where it says so."""
-        self._fraction = max(self._fraction, fraction)
-        super().go(self._fraction)
+        self.fraction = max(self.fraction, fraction)
+        super().go(self.fraction)
 
     def goes_on(self) -> bool:
         """Whether progress lets it go on."""
-        return self.progress is None or self.progress(self._fraction) is not False
+        return self.progress is None or self.progress(self.fraction) is not False
 
 
 def _structure(ctx: LoopContext) -> None:
@@ -195,21 +196,10 @@ def _numbers(ctx: LoopContext) -> None:
     }
 
 
-_SERVO = "control.pid_gain"  # every servo has it
-LOOP_STAGES = (
-    Stage("structure", _SERVO, "command, one channel of the motion that moves enough",
-          "cascade or PID", _structure),
-    Stage("closed loop", _SERVO, "the same; torque_current for torques, not ratios alone",
-          "gains, limits, inertia, friction, delays and offsets of the logger", _fit),
-    Stage("gains that change places", _SERVO, "a speed set point at its limit tells them apart",
-          "position gain, integral time", _exchange),
-    Stage("hold-out", _SERVO, "two logs, or one in halves", "errors of what is predicted",
-          _hold_out),
-    Stage("intervals", _SERVO, "the fit", "what is determined, and how well", _numbers),
-)  # fmt: skip
-
-
-#: A cascade's speed limit has no meaning as it was given for a PID.
+LOOP_STAGES = stages_of("loop", {
+    "structure": _structure, "closed loop": _fit, "gains that change places": _exchange,
+    "hold-out": _hold_out, "intervals": _numbers,
+})  # fmt: skip
 _CASCADE = ("cascade", "control.speed_limit")
 
 
@@ -241,16 +231,6 @@ def _ratios_only(
         for item in estimates
         if item.path in _SCALED
     }
-
-
-def _late(logs: Sequence[Log], transient: float | None) -> list[Log]:
-    """Return the logs without their first seconds."""
-    if transient is None:
-        return list(logs)
-    for log in logs:
-        if not 0.0 <= transient < log.duration:
-            raise InputError(f"transient of {transient:g} s: {log.name} lasts {log.duration:g} s")
-    return [log.counting(log.time >= transient) for log in logs]
 
 
 def _searched(ctx: LoopContext) -> list[Searched]:
@@ -319,8 +299,6 @@ def _estimates(
 
 def _static(stick: Knowledge, dynamic: Knowledge) -> Knowledge:
     """Static friction from its share of the dynamic one; their deviations add."""
-    from dataclasses import replace
-
     spread = stick.free.spread
     std = float(np.hypot(stick.std * spread, dynamic.std * dynamic.free.spread)) / spread
     free = replace(dynamic.free, path="friction.static", spread=spread, low=dynamic.free.low)
