@@ -38,11 +38,20 @@ def test_what_no_candidate_is_looked_for_by_makes_an_unknown_fault():
 
 
 def test_noise_that_a_candidate_amplifies_does_not_refute_it():
+    after = _probabilities((0.49, 0.49), allowed=(8.0, 0.0), by_run=(0.0, 0.0))
+    assert after.of("a") > 0.9
+    assert _probabilities((0.49, 0.49), allowed=(0.0, 0.0), by_run=(0.0, 0.0)).other > 0.9
+
+
+def test_what_a_model_run_shows_speaks_for_a_cause_and_a_wide_allowance_for_none():
+    assert _probabilities((0.8, 0.18), allowed=(0.0, 8.0), by_run=(0.0, 8.0)).of("b") > 0.7
+    assert _probabilities((0.8, 0.18), allowed=(0.0, 8.0), by_run=(0.0, 0.0)).other > 0.9
+
+
+def _probabilities(before, *, allowed, by_run):
+    """Weigh two causes by a noise that is eight deviations off."""
     plausible = Plausibility(("target_noise",), ("A",), *(np.array([x]) for x in (0.28, 0.2, 0.01)))
     one, two = (Hypothesis((k,), 0.0, 0.5, best=(0.4,)) for k in ("a", "b"))
-    before = Posterior((one, two), (0.49, 0.49), 0.02)
-    after = weigh_plausibility(before, plausible.score, plausible.degrees, np.array([[8.0], [0.0]]))
-    assert after.of("a") > 0.9
-    assert (
-        weigh_plausibility(before, plausible.score, plausible.degrees, np.zeros((2, 1))).other > 0.9
-    )
+    before = Posterior((one, two), before, 0.02)
+    rows = [np.array(x)[:, None] for x in (allowed, by_run)]
+    return weigh_plausibility(before, plausible.score, plausible.degrees, *rows)

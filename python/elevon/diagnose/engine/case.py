@@ -252,11 +252,13 @@ def shift_of(cases: Sequence[LogCase], key: str, severity: Floats) -> Floats:
     return np.hstack([case.shift(key, severity) for case in cases])
 
 
-def allowed(cases: Sequence[LogCase], sets: Sequence[Faults], runs: Sequence[bool]) -> Floats:
+def allowed(
+    cases: Sequence[LogCase], sets: Sequence[Faults], runs: Sequence[bool]
+) -> tuple[Floats, Floats]:
     """Return by how much sets of faults let stray what they are not looked for by, shape (h, m).
 
-    In deviations: a share of their whole shift, and what a model run makes of it, which has neither
-    noise nor a sampled controller.
+    In deviations: a share of their whole shift, noise that they amplify, and what a model run makes
+    of it, which has neither noise nor a sampled controller. Beside it the latter alone.
 
     Parameters
     ----------
@@ -274,17 +276,24 @@ def allowed(cases: Sequence[LogCase], sets: Sequence[Faults], runs: Sequence[boo
         moved = [shift_of(cases, c.key, np.array([s]))[0] for c, s in faults]
         strays.append(STRAY * float(np.linalg.norm(root @ np.sum(moved, axis=0))) if moved else 0.0)
     chosen = [faults if run else () for faults, run in zip(sets, runs, strict=True)]
-    rows = np.hstack([_run_plausible(case, chosen) for case in cases])
-    return np.asarray(np.hypot(rows, np.array(strays)[:, None]), dtype=np.float64)
+    by_run = np.hstack([_run_plausible(case, chosen) for case in cases])
+    louder = np.hstack([_amplified(case, chosen) for case in cases])
+    return np.hypot(by_run + louder, np.array(strays)[:, None]), by_run
 
 
-def _run_plausible(case: LogCase, sets: Sequence[Faults]) -> Floats:
-    """How far model runs with faults move it, shape (h, m), in deviations."""
+def _amplified(case: LogCase, sets: Sequence[Faults]) -> Floats:
+    """How far faults that amplify noise move it, shape (h, m), in deviations."""
     names, out = case.plausible.names, np.zeros((len(sets), len(case.plausible.names)))
     size = np.abs(case.plausible.mean) / case.plausible.std
     for k, faults in enumerate(sets):
         for c, severity in faults:
             out[k] += np.isin(names, c.amplified) * abs(severity) * size
+    return out
+
+
+def _run_plausible(case: LogCase, sets: Sequence[Faults]) -> Floats:
+    """How far model runs with faults move it, shape (h, m), in deviations."""
+    names, out = case.plausible.names, np.zeros((len(sets), len(case.plausible.names)))
     at = [k for k, faults in enumerate(sets) if faults]
     if case.item is None or not names or not at:
         return out

@@ -112,7 +112,7 @@ def _with_plausibility(
     sets = [[(known[k], b) for k, b in zip(h.keys, h.best, strict=True)] for h in result.hypotheses]
     runs = [p >= _WORTH for p in result.probabilities]
     degrees = min(case.plausible.degrees for case in cases)
-    return weigh_plausibility(result, score, degrees, allowed(cases, sets, runs))
+    return weigh_plausibility(result, score, degrees, *allowed(cases, sets, runs))
 
 
 def _judged(

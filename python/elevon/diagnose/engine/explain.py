@@ -87,7 +87,7 @@ def _implausible(
     """Return what faults are not looked for by and leave more than `REFUTED` deviations of."""
     if all(np.abs(case.plausible.score).max(initial=0.0) < REFUTED for case in cases):
         return None
-    wide = np.hypot(1.0, allowed(cases, [faults], [True])[0])
+    wide = np.hypot(1.0, allowed(cases, [faults], [True])[0][0])
     at = 0
     for case in cases:
         plausible = case.plausible

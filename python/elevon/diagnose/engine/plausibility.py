@@ -84,7 +84,7 @@ def chance_of_any(items: Sequence[Plausibility]) -> float:
 
 
 def weigh_plausibility(
-    result: Posterior, score: Floats, degrees: float, allowed: Floats
+    result: Posterior, score: Floats, degrees: float, allowed: Floats, by_run: Floats
 ) -> Posterior:
     """Return the hypotheses weigh_plausibility by what no candidate is looked for by.
 
@@ -101,15 +101,22 @@ def weigh_plausibility(
         How well these are known.
     allowed : ndarray, shape (h, m)
         By how much each hypothesis' features may stray, in deviations.
+    by_run : ndarray, shape (h, m)
+        The part of it that a model run shows.
     """
     from scipy.stats import norm
     from scipy.stats import t as student
 
     unmoved = student.logpdf(score, degrees)
-    strayed = student.logpdf(score, degrees, scale=np.hypot(1.0, allowed))
-    logs = np.logaddexp(np.log1p(-_STRAYED) + unmoved, np.log(_STRAYED) + strayed).sum(axis=1)
-    # Speaks against causes, for none: a wide allowance is no evidence.
-    logs = np.minimum(logs, logs[int(np.argmax(result.probabilities))])
+
+    def strayed(wide: Floats) -> Floats:
+        each = np.log(_STRAYED) + student.logpdf(score, degrees, scale=np.hypot(1.0, wide))
+        return np.asarray(np.logaddexp(np.log1p(-_STRAYED) + unmoved, each).sum(axis=1))
+
+    # Speaks for a cause that a model run shows to move them. A wide allowance is no evidence.
+    logs = strayed(allowed)
+    most = logs[int(np.argmax(result.probabilities))]
+    logs = np.minimum(logs, np.maximum(most, strayed(by_run)))
     far = np.max([norm.logpdf(score, scale=wide) for wide in _WIDE], axis=0)
     gain = far - np.log(2.0 * len(score) * len(_WIDE)) - unmoved
     other = float(np.sum(unmoved) + np.sum(np.maximum(gain, 0.0)))
