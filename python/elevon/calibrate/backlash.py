@@ -15,6 +15,7 @@ from elevon.arrays import Bools, Floats
 from elevon.estimate import quantile
 from elevon.estimate.covariance import numbered_strokes
 from elevon.estimate.residual import fit_residual
+from elevon.estimate.signals import through_backlash
 from elevon.logs.log import Log
 
 _TRAVEL = 3.0  # backlashes (or counts) of travel in both directions that a log must have
@@ -59,17 +60,6 @@ class BacklashFit:
     logs: tuple[str, ...]
     floats: bool = False
     beyond: float = 0.0
-
-
-def through_backlash(driver: Floats, width: float) -> Floats:
-    """Drag a follower through a total backlash; it starts in the middle. Shape as `driver`."""
-    half = 0.5 * width
-    out = np.empty_like(driver)
-    state = float(driver[0])
-    for k, x in enumerate(driver.tolist()):
-        state = min(max(state, x - half), x + half)
-        out[k] = state
-    return out
 
 
 def fit_backlash(logs: Sequence[Log], ratio: float, count: float) -> BacklashFit | None:

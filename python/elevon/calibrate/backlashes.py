@@ -8,6 +8,7 @@ from dataclasses import replace
 from statistics import fmean, stdev
 
 from elevon.calibrate.backlash import BacklashFit, fit_backlash, median_width
+from elevon.estimate.number import weighted_mean
 from elevon.logs.log import Log
 
 #: What may be estimated for each log on its own.
@@ -62,20 +63,11 @@ def pooled_backlash(backlashes: dict[str, BacklashFit]) -> BacklashFit:
         return best
     return replace(
         best,
-        offset=_mean([fit.offset for fit in fits]),
-        gain=_mean([fit.gain for fit in fits]),
-        delay=_mean([fit.delay for fit in fits]),
+        offset=weighted_mean([fit.offset for fit in fits]),
+        gain=weighted_mean([fit.gain for fit in fits]),
+        delay=weighted_mean([fit.delay for fit in fits]),
         logs=tuple(backlashes),
     )
-
-
-def _mean(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Weighted mean; its deviation grows with the scatter where that is larger."""
-    weight = [1.0 / max(std, 1e-12) ** 2 for _, std in pairs]
-    total = sum(weight)
-    mean = sum(w * value for w, (value, _) in zip(weight, pairs, strict=True)) / total
-    chi = sum(w * (value - mean) ** 2 for w, (value, _) in zip(weight, pairs, strict=True))
-    return mean, math.sqrt(max(1.0, chi / max(len(pairs) - 1, 1)) / total)
 
 
 def backlashes_differ(backlashes: dict[str, BacklashFit], extra: float) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.estimate.regression import huber
+from elevon.estimate.signals import integral
 from elevon.logs.log import Log
 
 _SLOW = 0.05  # of the highest speed: below it the direction of friction is not sure
@@ -92,10 +93,7 @@ def _control(logs: Sequence[Log]) -> Floats:
     for k, log in enumerate(logs):
         error = log.speed_ref - log.speed
         inside = np.abs(log.speed_ref) < 0.999 * saturated_speed(log)
-        integral = np.concatenate(
-            ([0.0], np.cumsum(0.5 * (error[1:] + error[:-1]) * np.diff(log.time)))
-        )
-        columns = [_smooth(log, error, 0), integral, _smooth(log, error, 1)]
+        columns = [_smooth(log, error, 0), integral(log.time, error), _smooth(log, error, 1)]
         columns += [np.full_like(error, float(j == k)) for j in range(len(logs))]
         keep = log.good & inside
         rows.append(np.column_stack(columns)[keep])

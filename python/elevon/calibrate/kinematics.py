@@ -19,6 +19,7 @@ from elevon.calibrate.direct import saturated_speed
 from elevon.errors import InputError
 from elevon.estimate.covariance import block_covariance, joined, robust_covariance
 from elevon.estimate.residual import fit_residual
+from elevon.estimate.signals import integral
 from elevon.logs.command.fit import WaveformFit, best_waveform, fit_waveform
 from elevon.logs.command.guess import FREE
 from elevon.logs.command.known import NotedCommand, align_noted, noted_values
@@ -204,9 +205,7 @@ def speed_sensor(logs: Sequence[Log]) -> dict[str, tuple[float, float]] | None:
     rows, data, blocks = [], [], []
     used = [log for log in logs if log.has("motor_position") and np.ptp(log.motor) > 0.0]
     for k, log in enumerate(used):
-        turned = np.concatenate(
-            ([0.0], np.cumsum(0.5 * (log.speed[1:] + log.speed[:-1]) * np.diff(log.time)))
-        )
+        turned = integral(log.time, log.speed)
         starts = [np.full_like(turned, float(j == k)) for j in range(len(used))]
         # Differences over a block of time: their noise is that of the speed, not its sum.
         step = max(1, round(0.05 / log.period))

@@ -19,9 +19,10 @@ import numpy as np
 
 from elevon.arrays import Bools, Floats
 from elevon.calibrate.direct import saturated_speed
-from elevon.calibrate.motion import acceleration_of, dilated, integral, kernel, lagged, smoothed
+from elevon.calibrate.motion import acceleration_of, dilated, kernel, lagged, smoothed
 from elevon.estimate.covariance import Strokes
 from elevon.estimate.regression import Regression, huber, regressed
+from elevon.estimate.signals import integral
 from elevon.logs.log import Log
 
 _SETTLED = 0.25  # s around a saturated set point in which anti-windup may act

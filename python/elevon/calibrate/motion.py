@@ -121,8 +121,3 @@ def delayed(columns: Floats, lag: float, period: float) -> Floats:
     at = np.fft.rfftfreq(len(folded), period)
     turned = np.fft.rfft(folded, axis=0) * np.exp(-2j * np.pi * at * lag)[:, None]
     return np.asarray(np.fft.irfft(turned, len(folded), axis=0)[: len(columns)], dtype=np.float64)
-
-
-def integral(time: Floats, values: Floats) -> Floats:
-    """Return the running integral, zero at first."""
-    return np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))))

@@ -17,6 +17,7 @@ from elevon.calibrate.backlashes import (
 from elevon.calibrate.kinematics import CommandFit, speed_limit, speed_sensor
 from elevon.calibrate.named import named
 from elevon.estimate import Estimate, quantile
+from elevon.estimate.number import weighted_mean
 from elevon.logs.log import Log
 
 _OTHER = 0.005  # relative: a limit nearer the actuator file's than this is the actuator file's
@@ -193,10 +194,7 @@ def gain_estimate(fits: Sequence[CommandFit], actuator: Actuator) -> Estimate | 
     ]
     if not good:
         return None
-    total = sum(1.0 / std**2 for _, std in good)
-    gain = sum(fit.gain / std**2 for fit, std in good) / total
-    chi = sum(((fit.gain - gain) / std) ** 2 for fit, std in good)
-    spread = max(1.0, chi / max(len(good) - 1, 1))
+    gain, deviation = weighted_mean([(fit.gain, std) for fit, std in good])
     note = f"from the command's waveform in {', '.join(fit.log for fit, _ in good)}"
-    number = Estimate(gain, math.sqrt(spread / total), max(len(good) - 1.0, 2.0))
+    number = Estimate(gain, deviation, max(len(good) - 1.0, 2.0))
     return named(number, "control.position_gain", actuator, note)

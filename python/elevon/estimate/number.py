@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Annotated, ClassVar
+
+import numpy as np
 
 from elevon.plain import WORKING, Plain, key
 
@@ -89,6 +91,15 @@ Determined = tuple[dict[str, Estimate], dict[str, str]]
 def as_values(estimates: Mapping[str, Estimate]) -> dict[str, float]:
     """Return path to value."""
     return {path: item.value for path, item in estimates.items()}
+
+
+def weighted_mean(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return mean and deviation of (value, deviation); wider where they scatter by more."""
+    values, deviations = np.array(pairs).T
+    weight = np.maximum(deviations, 1e-12) ** -2.0
+    mean = float(np.sum(weight * values) / np.sum(weight))
+    chi = float(np.sum(weight * (values - mean) ** 2)) / max(len(pairs) - 1, 1)
+    return mean, math.sqrt(max(1.0, chi) / float(np.sum(weight)))
 
 
 @cache

@@ -20,6 +20,7 @@ from elevon.calibrate.stages.moves import Move, moves_of
 from elevon.calibrate.stages.third_phase import ThirdPhase
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
+from elevon.estimate.signals import local_polynomial
 from elevon.logs.log import Log
 
 _START = 0.1  # s after the drive begins ...
@@ -106,11 +107,7 @@ def _third_phase(part: Driving, third: ThirdPhase | None) -> tuple[Floats, Float
 
 
 def _smooth(values: Floats, period: float, *, slope: bool = False) -> Floats:
-    from scipy.signal import savgol_filter
-
-    width = max(5, 2 * round(0.5 * _WIDTH / period) + 1)
-    out = savgol_filter(values, width, 2, deriv=int(slope), delta=period)
-    return np.asarray(out, dtype=np.float64)
+    return local_polynomial(values, period, _WIDTH, slope=slope)
 
 
 def driving(logs: Sequence[Log], actuator: Actuator) -> list[Driving]:

@@ -24,6 +24,7 @@ from elevon.calibrate.stages.moves import Move, moves_of
 from elevon.estimate import Determined, Estimate
 from elevon.estimate.regression import with_deviations
 from elevon.estimate.residual import fit_residual
+from elevon.estimate.signals import local_polynomial
 from elevon.logs.log import Log
 
 #: Roles that this way needs.
@@ -119,8 +120,6 @@ def _ramp(log: Log, move: Move, actuator: Actuator, motor: Motor) -> _Ramp | Non
 
 def _demand(log: Log, actuator: Actuator, motor: Motor) -> tuple[Floats, Floats]:
     """Demanded voltage from current and speed, and the link's, as sizes."""
-    from scipy.signal import savgol_filter
-
     stand = dict(log.stand.parameters)
     value = actuator.with_values(stand, source="stand of the log").parameters.value
     speed, current = np.abs(log["motor_speed"]), np.abs(log["torque_current"])
@@ -132,8 +131,7 @@ def _demand(log: Log, actuator: Actuator, motor: Motor) -> tuple[Floats, Floats]
         if log.has("supply_voltage")
         else np.full(len(speed), value("inverter.supply_voltage"))
     )
-    width = max(5, 2 * round(0.5 * _WIDTH / log.period) + 1)
-    slope = savgol_filter(current, width, 2, deriv=1, delta=log.period)
+    slope = local_polynomial(current, log.period, _WIDTH, slope=True)
     emf = 2.0 * value("motor.emf_constant") * speed
     demand = emf
     for _ in range(_ROUNDS):

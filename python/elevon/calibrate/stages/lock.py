@@ -17,6 +17,7 @@ from elevon.calibrate.stages.moves import Move, moves_of
 from elevon.calibrate.stages.rig_tables import GRAVITY, KNOTS, hats, knots
 from elevon.calibrate.stages.rig_tests import RigTest, rig_tests
 from elevon.estimate import Estimate
+from elevon.estimate.number import weighted_mean
 from elevon.logs.log import Log
 
 _BEFORE = (0.02, 1.0)  # s between nut and ram, over which both are held together
@@ -45,7 +46,8 @@ def travels(ctx: Context) -> None:
     for path, rows in (("lock.engage_travel", engaged), ("lock.release_travel", released)):
         direction = "extension to" if "engage" in path else "retraction from"
         why = f"no {direction} the lock with its switch recorded"
-        ctx.add({path: _joined(rows)} if rows else {}, {path: why})
+        mean, std = weighted_mean(rows) if rows else (0.0, 0.0)
+        ctx.add({path: Estimate(abs(mean), std)} if rows else {}, {path: why})
 
 
 def _lock_switch(log: Log) -> Bools | None:
@@ -116,15 +118,6 @@ def _at_switch(
     speed = abs(float(place[min(k + 1, len(place) - 1)] - place[k - 2])) / (3.0 * log.period)
     clock = float(np.hypot(log.period, value("control.period"))) / np.sqrt(12.0)
     return at, float(np.hypot(speed * clock, open_[k]))
-
-
-def _joined(rows: Sequence[tuple[float, float]]) -> Estimate:
-    values, deviations = np.array(rows).T
-    weight = deviations**-2.0
-    middle = float(np.sum(weight * values) / np.sum(weight))
-    # Motions further apart than their deviations say something else of these (Birge's ratio).
-    apart = float(np.sum(weight * (values - middle) ** 2)) / max(len(values) - 1, 1)
-    return Estimate(abs(middle), max(1.0, apart**0.5) * float(np.sum(weight)) ** -0.5)
 
 
 def brake(ctx: Context) -> None:

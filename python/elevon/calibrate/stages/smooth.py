@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from elevon.arrays import Bools, Floats
+from elevon.estimate.signals import local_polynomial
 from elevon.logs.log import Log, per_log
 
 LOAD = ("load", "load_cell")
@@ -55,10 +56,7 @@ def apart(log: Log, corner: float = CORNERS[0]) -> Bools:
 
 def smoothed(values: Floats, period: float) -> Floats:
     """Values through the polynomials that smooth all channels alike."""
-    from scipy.signal import savgol_filter
-
-    width = max(5, 2 * round(0.5 * _WIDTH / period) + 1)
-    return np.asarray(savgol_filter(values, width, 3), dtype=np.float64)
+    return local_polynomial(values, period, _WIDTH, order=3)
 
 
 def slope(values: Floats, period: float) -> Floats:

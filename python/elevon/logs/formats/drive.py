@@ -123,12 +123,12 @@ def write_drive_csv(
     columns = {key: c for key, c in drive_columns().items() if c.channel in arrays}
     scaled = [arrays[c.channel] * _factor(key, layout) for key, c in columns.items()]
     text = io.StringIO()
-    text.write(layout.delimiter.join(c.name for c in columns.values()) + layout.line_end)
-    for row in np.column_stack(scaled).tolist():
-        cells = [f"{value:.{layout.digits}g}" for value in row]
-        line = layout.delimiter.join(cells)
-        text.write((line.replace(".", ",") if layout.decimal_comma else line) + layout.line_end)
-    return write_bytes(path, text.getvalue().encode(layout.encoding), force=force)
+    np.savetxt(
+        text, np.column_stack(scaled), f"%.{layout.digits}g", layout.delimiter, layout.line_end
+    )
+    rows = text.getvalue().replace(".", ",") if layout.decimal_comma else text.getvalue()
+    head = layout.delimiter.join(c.name for c in columns.values()) + layout.line_end
+    return write_bytes(path, (head + rows).encode(layout.encoding), force=force)
 
 
 def _factor(key: str, layout: DriveFormat) -> float:

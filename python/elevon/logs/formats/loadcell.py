@@ -102,8 +102,7 @@ def write_loadcell(
         raise RangeError("load cell: a value is not finite")
     text = io.StringIO()
     text.write(f"time [s],value [{unit}]\n")
-    for t, v in zip(times.tolist(), values.tolist(), strict=True):
-        text.write(f"{t:.9g},{v:.9g}\n")
+    np.savetxt(text, np.column_stack((times, values)), "%.9g", ",")
     return write_bytes(path, text.getvalue().encode("utf-8"), force=force)
 
 

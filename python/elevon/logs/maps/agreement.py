@@ -13,6 +13,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
+from elevon.estimate.signals import integral
 from elevon.logs.maps.column_map import ColumnMap
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
@@ -62,7 +63,7 @@ def check_agreement(
             continue
         seen = np.asarray(reference.values, dtype=np.float64)
         if how == "integral":
-            seen = _integral(value.time, seen)
+            seen = integral(value.time, np.where(np.isfinite(seen), seen, 0.0))
         elif how == "ratio":
             seen = seen / float(ratio or 1.0)
         slope, explained = slope_and_fit(seen, np.asarray(value.values, dtype=np.float64))
@@ -90,12 +91,6 @@ def slope_and_fit(x: Floats, y: Floats) -> tuple[float, float]:
         return 0.0, 0.0
     slope = float(dx @ dy) / power
     return slope, 1.0 - float(np.sum((dy - slope * dx) ** 2)) / spread
-
-
-def _integral(time: Floats, rate: Floats) -> Floats:
-    filled = np.where(np.isfinite(rate), rate, 0.0)
-    steps = 0.5 * (filled[1:] + filled[:-1]) * np.diff(time)
-    return np.concatenate(([0.0], np.cumsum(steps)))
 
 
 def evened(time: Floats) -> Floats:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.estimate.signals import through_backlash
 
 MOTOR_COUNTS = 2.0**24  # absolute encoder of the motor, counts a turn (test-bench thesis)
 ENCODER_COUNTS = 20_000.0  # 5000 pulses, four edges each, a turn of the encoder's own wheel
@@ -104,13 +105,13 @@ def slope_with_backlash(reference: Floats, position: Floats) -> Fit:
     step = max(1, len(reference) // 4000)
     x, y = reference[::step], position[::step]
     widths = travel * np.linspace(0.0, 0.6, 13)
-    errors = [_line(_through_backlash(x, width), y)[1] for width in widths]
+    errors = [centred_line(through_backlash(x, width), y)[1] for width in widths]
     best = int(np.argmin(errors))
     low, high = widths[max(best - 1, 0)], widths[min(best + 1, len(widths) - 1)]
     width = _golden(x, y, float(low), float(high))
-    if errors[0] <= _line(_through_backlash(x, width), y)[1]:
+    if errors[0] <= centred_line(through_backlash(x, width), y)[1]:
         width = 0.0
-    slope, error = _line(_through_backlash(x, width), y)
+    slope, error = centred_line(through_backlash(x, width), y)
     return Fit(slope, width, error, travel)
 
 
@@ -118,27 +119,14 @@ def _golden(x: Floats, y: Floats, low: float, high: float) -> float:
     ratio = (math.sqrt(5.0) - 1.0) / 2.0
     for _ in range(12):
         a, b = high - ratio * (high - low), low + ratio * (high - low)
-        if _line(_through_backlash(x, a), y)[1] <= _line(_through_backlash(x, b), y)[1]:
+        if centred_line(through_backlash(x, a), y)[1] <= centred_line(through_backlash(x, b), y)[1]:
             high = b
         else:
             low = a
     return 0.5 * (low + high)
 
 
-def _through_backlash(x: Floats, width: float) -> Floats:
-    """Pass a motion through a dead zone of a total width (Prandtl's backlash operator)."""
-    if width == 0.0:
-        return x
-    half = 0.5 * width
-    out = np.empty_like(x)
-    state = float(x[0])
-    for k, value in enumerate(x.tolist()):
-        state = min(max(state, value - half), value + half)
-        out[k] = state
-    return out
-
-
-def _line(x: Floats, y: Floats) -> tuple[float, float]:
+def centred_line(x: Floats, y: Floats) -> tuple[float, float]:
     """Slope of y over x, and the RMS of the residual over that of the fitted motion."""
     dx, dy = x - x.mean(), y - y.mean()
     power = float(dx @ dx)

@@ -14,6 +14,7 @@ from itertools import permutations
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.estimate.signals import integral
 from elevon.logs.maps.agreement import slope_and_fit
 from elevon.units import parse_unit
 
@@ -102,8 +103,7 @@ def _best_pair(time: Floats, candidates: Candidates) -> tuple[str, str, float, f
             continue
         if roles[1] in {"command", "output_position", "motor_position", "speed_ref"}:
             continue
-        rate = candidates[speed][2]
-        turned = np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))))
+        turned = integral(time, candidates[speed][2])
         slope, explained = slope_and_fit(turned, candidates[position][2])
         if explained > _INTEGRAL and (best is None or explained > best[3]):
             best = (position, speed, slope, explained)

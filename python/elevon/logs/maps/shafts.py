@@ -10,9 +10,11 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
+from elevon.estimate.signals import integral
 from elevon.logs.maps.consistency import (
     Fit,
     UnitCandidate,
+    centred_line,
     encoder_candidates,
     match,
     motor_candidates,
@@ -39,8 +41,7 @@ def travel_from_speed(time: Floats, speed: Floats) -> Floats:
     """Integrate a speed [rad/s] by the trapezoidal rule; missing samples are bridged."""
     good = np.isfinite(speed)
     filled = np.interp(time, time[good], speed[good]) if good.any() else np.zeros_like(time)
-    steps = 0.5 * (filled[1:] + filled[:-1]) * np.diff(time)
-    return np.concatenate(([0.0], np.cumsum(steps)))
+    return integral(time, filled)
 
 
 def settle_motor(
@@ -169,10 +170,8 @@ def _against(reference: Floats, position: Floats) -> Fit:
     if abs(float(np.corrcoef(dx, line)[0, 1])) < 0.9:
         power = float(line @ line)
         dx, dy = dx - line * (dx @ line) / power, dy - line * (dy @ line) / power
-    slope = float(dx @ dy) / float(dx @ dx)
-    residual = float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
-    moved = abs(slope) * float(np.sqrt(np.mean(dx**2)))
-    return Fit(slope, 0.0, residual / moved if moved > 0.0 else math.inf, travel)
+    slope, error = centred_line(dx, dy)
+    return Fit(slope, 0.0, error, travel)
 
 
 def _refuse_shaft(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from elevon.actuator import Actuator
 from elevon.calibrate.stages.closed_loop.log import NAMES, recorded_roles, sigma, unsigned
 from elevon.calibrate.stages.log import motor_ratio
+from elevon.data import packaged_toml
 from elevon.errors import unknown
 from elevon.estimate import Free
 from elevon.logs.log import Log
+from elevon.parameters.records import records
 
 STRUCTURES = ("cascade", "pid")
 _LATEST = 2e-2  # s, lag of a current loop
@@ -37,8 +39,9 @@ def free_list(
     `starts` are first values from the signals; what is not there starts from the actuator file.
     """
     channels = {NAMES[role] for log in logs for role in recorded_roles(log)}
-    items = [*_plant(actuator), *_controller(actuator, structure)]
-    items += [*_current_loop(actuator), *_limits(channels)]
+    unseen = () if "current" in channels else ("control.current_limit", "sensor.filter_cutoff")
+    items = [*_plant(actuator), *_rows(actuator, structure), *_current_loop(actuator)]
+    items += _rows(actuator, "limits", unseen)
     return [_started(item, actuator, starts) for item in items] + _logger_rows(logs, channels)
 
 
@@ -60,63 +63,37 @@ def asked_for(free: Sequence[Free], names: Sequence[str]) -> list[Free]:
     return [item for item in free if item.path in chosen or not in_set(item.path)]
 
 
-def _row(path: str, unit: str, register: str, spread: float, bounds: tuple[float, float]) -> Free:
-    return Free(path, math.nan, spread, *bounds, True, unit, register)
+def _row(actuator: Actuator, path: str, spread: float, low: float, high: float) -> Free:
+    record = records(actuator.wiring).get(path)
+    unit, register = ("1", "plant") if record is None else (record.unit, record.register)
+    return Free(path, math.nan, spread, low, high, True, unit, register)
+
+
+def _rows(actuator: Actuator, group: str, leave_out: Collection[str] = ()) -> list[Free]:
+    """Return the free numbers of a group of ``free.toml``."""
+    table = packaged_toml("elevon.calibrate.stages.closed_loop", "free.toml")[group]
+    return [_row(actuator, p, *numbers) for p, numbers in table.items() if p not in leave_out]
 
 
 def _plant(actuator: Actuator) -> list[Free]:
-    linear = actuator.wiring == "ballscrew"
-    rows = [
-        _row("motor.inertia", "kg m2", "plant", 1.5, (1e-9, 1e3)),
-        _row("friction.dynamic", "N m", "plant", 1.5, (1e-7, 1e4)),
-        _row(STICK, "1", "plant", 0.3, (1.0, 5.0)),
-        _row("friction.reverse_scale", "1", "plant", 0.2, (0.1, 10.0)),
-        _row("friction.viscous", "N m s/rad", "plant", 2.0, (1e-9, 1e3)),
-    ]
-    if str(actuator.parameters["friction.law"].value) == "load_dependent":
-        rows.append(_row(LOAD_SHARE, "1", "plant", 1.0, (1e-3, 0.9)))
+    """Return motor, friction and load."""
+    by_load = str(actuator.parameters["friction.law"].value) == "load_dependent"
     weight = _torque_scale(actuator) * motor_ratio(actuator)
-    rows.append(
-        Free("load.constant", 0.0, weight, -50.0 * weight, 50.0 * weight,
-             unit="N" if linear else "N m", register="load")
-    )  # fmt: skip
-    return rows
-
-
-def _controller(actuator: Actuator, structure: str) -> list[Free]:
-    linear = actuator.wiring == "ballscrew"
-    if structure == "pid":
-        return [
-            _row("control.pid_gain", "N" if linear else "N m/rad", "controller", 2.0, (1e-6, 1e9)),
-            _row("control.pid_integral_time", "s", "controller", 1.5, (1e-3, 1e3)),
-            _row("control.pid_derivative_time", "s", "controller", 1.5, (1e-5, 1e2)),
-            _row("control.pid_derivative_filter", "1", "controller", 0.7, (1.0, 1e3)),
-        ]
-    gain = "rad/(m s)" if linear else "1/s"
+    unit = "N" if actuator.wiring == "ballscrew" else "N m"
     return [
-        _row("control.position_gain", gain, "controller", 2.0, (1e-3, 1e8)),
-        _row("control.speed_gain", "N m s/rad", "controller", 2.0, (1e-9, 1e4)),
-        _row("control.integral_time", "s", "controller", 1.5, (1e-3, 1e3)),
-        _row("control.speed_limit", "rad/s", "controller", 1.0, (1e-2, 1e5)),
-    ]
+        *_rows(actuator, "plant", () if by_load else (LOAD_SHARE,)),
+        Free("load.constant", 0.0, weight, -50.0 * weight, 50.0 * weight, unit=unit,
+             register="load"),
+    ]  # fmt: skip
 
 
 def _current_loop(actuator: Actuator) -> list[Free]:
-    """How late the drive acts (reads, waits, holds), as the lag of its current loop."""
+    """Return the gain of the current's loop, where a carrier drives it."""
     nominal = actuator.parameters.value(CURRENT_GAIN)
     slowest = actuator.parameters.value("motor.winding_inductance") / _LATEST
     if str(actuator.parameters["drive.kind"].value) != "pwm" or not nominal > slowest:
         return []
-    # What waits only adds to the lag that the loop has of its own.
-    return [_row(CURRENT_GAIN, "V/A", "controller", 1.0, (slowest, nominal))]
-
-
-def _limits(channels: set[str]) -> list[Free]:
-    rows = [_row("inverter.supply_voltage", "V", "plant", 0.2, (1e-1, 1e5))]
-    if "current" in channels:
-        rows.insert(0, _row("control.current_limit", "A", "controller", 0.7, (1e-3, 1e5)))
-        rows.append(_row("sensor.filter_cutoff", "Hz", "sensor", 1.0, (0.5, 1e5)))
-    return rows
+    return [_row(actuator, CURRENT_GAIN, 1.0, slowest, nominal)]
 
 
 def _logger_rows(logs: Sequence[Log], channels: set[str]) -> list[Free]:
