@@ -60,6 +60,19 @@ def test_backlash_of_a_screw_is_named_and_a_healthy_day_is_healthy(screw):
     assert worn.unobservable == ()  # both are seen, others were not requested
 
 
+def test_what_no_candidate_moves_is_seen_by_roles_too(screw, gear):
+    """A motor's speed read 1.5 rad/s off moves no feature that a candidate moves."""
+    few = ["backlash@transmission", "gain_drift@control.position"]
+    base, item = log(screw, day=1, name="base"), log(screw, day=2, name="off")
+    off = item.with_channels(motor_speed=item.speed + 1.5)
+    answer = diagnose([replace(off, recording=None)], screw, baselines=[base], faults=few)
+    assert (answer.status, answer.reason.feature) == ("unknown_fault", "speed_offset")
+    # A motion one way tells no offset of a current from dry friction.
+    names = role_log(log(gear), gear).plausible.names
+    assert "current_noise" in names
+    assert not {"current_mean", "creeping_current"} & set(names)
+
+
 def test_two_faults_of_a_screw_are_named_together(screw):
     few = ["backlash@transmission", "gain_drift@control.position", "short@motor.phase_a"]
     base = [log(screw, day=1, name="base")]

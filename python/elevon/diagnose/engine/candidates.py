@@ -89,6 +89,10 @@ _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _RINGS = tuple(f"bearing.{p}" for p in ("outer", "inner", "ball"))
 _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
 _LOOP_NOISE = ("target_noise", "control_noise", "voltage_noise", "voltage_rest")
+#: What a loop of a greater gain amplifies, by its place.
+_AMPLIFIED = {
+    "control.position": ("reference_noise", *_LOOP_NOISE), "control.speed": _LOOP_NOISE,
+}  # fmt: skip
 _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage_sideband")
 
 # How well the reduced-order model knows what a fault does, ASSUMED from benches with another
@@ -120,9 +124,9 @@ CANDIDATES: tuple[CandidateFault, ...] = (
                    ambiguous=(("offset", "sensor.resolver"),)),
     CandidateFault("unbalance", "motor.rotor", "kg m2", 0.0, 4e-4, _BEARING / 10, 0.05),
     CandidateFault("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003,
-                   amplified=("reference_noise", *_LOOP_NOISE)),
+                   amplified=_AMPLIFIED["control.position"]),
     CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05,
-                   amplified=_LOOP_NOISE),
+                   amplified=_AMPLIFIED["control.speed"]),
     CandidateFault("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01,
                    known_features=("position_scale",),
                    ambiguous=(("gain", "sensor.resolver"),)),
@@ -194,6 +198,7 @@ def _candidate(record: FaultRecord, places: tuple[str, ...]) -> CandidateFault:
     return CandidateFault(
         record.kind, places[0], unit, low, 1.0 if record.switched else high, _RATE, _ERROR,
         places[1:], switched=record.switched, whole=record.whole or record.switched,
+        amplified=_AMPLIFIED.get(places[0], ()) if record.kind == "gain_drift" else (),
     )  # fmt: skip
 
 

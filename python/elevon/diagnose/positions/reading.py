@@ -112,16 +112,11 @@ class PositionReading(Reading):
     @cached_property
     def plausible(self) -> FeatureVector:
         """What the log shows beside that and no candidate moves."""
-        return self._plausible(self.log)
-
-    def _plausible(self, log: Log) -> FeatureVector:
-        value = self.actuator.parameters.value
-        ratio, pole_pairs = value("gear.ratio"), value("motor.pole_pairs")
-        return plausibility_of(log, ratio=ratio, pole_pairs=pole_pairs)
+        return plausibility_of(self.log, self.actuator)
 
     def plausible_of(self, units: Sequence[ReplayUnit]) -> list[FeatureVector]:
         """Return the same of units that run the test."""
-        return [self._plausible(run) for run in self._runs(units)]
+        return [plausibility_of(run, self.actuator) for run in self._runs(units)]
 
     @property
     def plausible_table(self) -> FeatureTable:

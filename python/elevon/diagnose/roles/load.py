@@ -13,11 +13,13 @@ from elevon.diagnose.roles.series import lines, noise_deviation, smoothed
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.logs.log import Log
 
 _SMOOTH = 0.05  # s over which a load is averaged before it becomes straight lines
 _ROUGH = 0.01  # of the load's size: what straight lines may miss
 _NOISE = 5.0  # deviations of its noise that a load's RMS must reach to be one
 _LOADED = 0.15  # of the load's size, RMS; a load that follows the motion differs with the unit
+_PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time
 _KNOTS = 9  # of the model's load over its stroke
 _TIED = 1e-3  # of a knot's neighbours, where no sample determines a knot
 
@@ -112,3 +114,13 @@ def load_alike(
     largest = max(float(np.abs(push).max()) for push in pushes)
     off = float(np.sqrt(np.mean((pushes[0] - pushes[1]) ** 2)))
     return off <= _LOADED * largest
+
+
+def drives_output(log: Log, deflection: Floats | None) -> bool:
+    """Whether a load drives the output of an elastic backlash over a tenth of the motion."""
+    if deflection is None:
+        return False
+    speed = np.gradient(log["command"], log.time)
+    pushed = deflection * np.sign(speed) < -_PUSHED * np.abs(deflection).max()
+    moving = np.abs(speed) > _PUSHED * np.abs(speed).max()
+    return bool(np.mean(pushed[moving]) > _PUSHED)

@@ -14,9 +14,10 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.days import daily, factors_of
 from elevon.diagnose.engine.reading import Days, DrawnSignal, Reading, ReplayUnit
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
-from elevon.diagnose.roles.load import OverStroke, load_alike
+from elevon.diagnose.positions.plausibility import PLAUSIBLE, plausibility_of
+from elevon.diagnose.roles.load import OverStroke, drives_output, load_alike
 from elevon.diagnose.roles.numbers import Numbers, numbers_of
-from elevon.diagnose.roles.series import averaged, noise_deviation
+from elevon.diagnose.roles.series import averaged, noise_deviation, oversampling
 from elevon.experiment import Experiment, Inputs, Variant, signals_by_role
 from elevon.logs.log import Log, on_clock
 from elevon.parameters.records import wirings
@@ -29,9 +30,7 @@ BEFORE = 0.1  # s before the onset that are read
 _ALIKE = 0.05  # of the command's range, RMS, up to which two commands are the same
 _SERVES = 0.005  # likewise, up to which faults do the same in both
 _SOONER = 1.3  # times the length of a log's baseline that the log may have
-_OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
 _ELASTIC = 1.0  # backlash.model: an elastic contact
-_PUSHED = 0.1  # of the greatest load, of the fastest motion, and share of the time
 _SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
 _AGAIN = 8  # logs with noise added
 _DRAWS = 28
@@ -127,6 +126,21 @@ class RoleReading(Reading):
         """Its features' records."""
         return self._read[1]
 
+    @cached_property
+    def plausible(self) -> FeatureVector:
+        """What the log shows beside that and no candidate moves."""
+        return plausibility_of(self.log, self.actuator)
+
+    @property
+    def plausible_table(self) -> FeatureTable:
+        """Records of that."""
+        return PLAUSIBLE
+
+    def plausible_of(self, units: Sequence[ReplayUnit]) -> list[FeatureVector]:
+        """Return the same of units that run the test."""
+        runs = self._channels(units)
+        return [plausibility_of(self.log.with_channels(**r), self.actuator) for r in runs]
+
     def _numbers(self, channels: Mapping[str, Floats]) -> Numbers:
         known = self.actuator.parameters
         pairs = known.value("motor.pole_pairs") if "motor.pole_pairs" in known else None
@@ -177,7 +191,7 @@ class RoleReading(Reading):
         """What each unit shows by the log's roles, on its instants."""
         known = signals_by_role(self.actuator.wiring, "low")
         signals = {role: known[role] for role in self.seen if role in known}
-        over = _over(self.rate, solver_step(self.actuator, "low"))
+        over = oversampling(self.rate, solver_step(self.actuator, "low"))
         experiment = Experiment(
             self.log, self.actuator, self._inputs(), signals, rate=f"{over * self.rate:.12g} Hz"
         )
@@ -361,7 +375,7 @@ class RoleReading(Reading):
     def notes(self, same: Sequence[Reading]) -> list[str]:
         """Return what the log lacks and what it costs."""
         out = list(self.findings)
-        if self._driven():
+        if drives_output(self.log, self.deflection):
             out.append(
                 f"{self.name}: the load drives the output part of the time and holds it at one end "
                 "of its backlash, where the reduced-order model has it carried by friction: "
@@ -374,19 +388,3 @@ class RoleReading(Reading):
                 "faults are not seen"
             )
         return out
-
-    def _driven(self) -> bool:
-        """Whether a load drives the output of an elastic backlash over a tenth of the motion."""
-        deflection = self.deflection
-        if deflection is None:
-            return False
-        speed = np.gradient(self.log["command"], self.log.time)
-        pushed = deflection * np.sign(speed) < -_PUSHED * np.abs(deflection).max()
-        moving = np.abs(speed) > _PUSHED * np.abs(speed).max()
-        return bool(np.mean(pushed[moving]) > _PUSHED)
-
-
-def _over(rate: float, step: float) -> int:
-    """Samples of the model to one of a log, an even number as far as its steps allow it."""
-    steps = round(1.0 / (rate * step))
-    return next((n for n in (_OVER, 2) if steps % n == 0), 1)

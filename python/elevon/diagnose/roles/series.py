@@ -6,6 +6,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 
+_OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
 _NORMAL = 1.4826  # deviation over the median of the size, of Gaussian noise
 
 
@@ -49,3 +50,9 @@ def averaged(values: Floats, over: int) -> Floats:
     out = values.copy()
     out[half:-half] = (total[over:] - total[:-over]) / over
     return out
+
+
+def oversampling(rate: float, step: float) -> int:
+    """Samples of the model to one of a log, an even number as far as its steps allow it."""
+    steps = round(1.0 / (rate * step))
+    return next((n for n in (_OVER, 2) if steps % n == 0), 1)
