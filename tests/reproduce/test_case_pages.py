@@ -15,7 +15,7 @@ PAGES = sorted(
 EXPRESSIONS = ("each", "when", "rows", "marked", "draw")
 KNOWN = {
     "part": {"section", "heading", "text", "points", "figure", "table", "each", "when"},
-    "table": {"rows", "columns", "caption", "folded", "digits", "marked", "when"},
+    "table": {"rows", "columns", "caption", "folded", "digits", "marked", "each", "when"},
     "figure": {"caption", "size", "grid", "options", "axes", "draw", "each", "when"},
     "axes": {"calls", "each", "when"},
 }

@@ -28,7 +28,6 @@ from elevon.reproduce.pisa_currents import (
     sectors,
     shorted_pulses,
 )
-from elevon.reproduce.pisa_currents_page import commutation_report
 
 
 def failed(checks):
@@ -134,4 +133,4 @@ def test_the_ballscrews_figures_pass():
 def test_the_gears_currents_pass():
     result = reproduce_commutation()
     assert failed(result.checks) == []
-    assert "As Fig. 5.4" in commutation_report(result, date="2026-01-01").html()
+    assert "As Fig. 5.4" in case_page("pisa-commutation", result, date="2026-01-01").html()

@@ -11,6 +11,7 @@ import pytest
 
 import elevon
 from elevon.faults.catalogue import catalogue
+from elevon.reproduce.case_page import case_page
 from elevon.reproduce.pisa_failures import (
     LISTED,
     PHASES,
@@ -19,9 +20,10 @@ from elevon.reproduce.pisa_failures import (
     reproduce_failures,
     severities,
 )
-from elevon.reproduce.pisa_failures_page import failures_report, matrix, summary
+from elevon.reproduce.pisa_failures_page import summary
 from elevon.reproduce.pisa_gear import ACTUATOR
 from tests.physics.gear import gear
+from tests.reproduce.failures_table import matrix
 
 PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "landing-gear-failures.md"
 COLUMNS = {"fault", "phase", "indicated", "true_state", "safe", "detected_by", "time_s"}
@@ -38,7 +40,7 @@ def test_a_slipping_brake_never_gives_a_false_indication() -> None:
     assert at_rest["indicated"] == "fault"
     assert at_rest["detected_by"] == "fault: uncommanded motion"
     assert 0.0 < at_rest["time_s"] < 0.3
-    assert "at rest, retracted" in failures_report(result, date="2000-01-01").html()
+    assert "at rest, retracted" in case_page("pisa-failures", result, date="2000-01-01").html()
     assert len(summary(result)[1]) == len(PHASES)
     assert matrix(result).splitlines()[2] in PAGE.read_text(encoding="utf-8")
 

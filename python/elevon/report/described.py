@@ -3,13 +3,15 @@
 A description is a mapping (a TOML file) with ``title``, ``lead``, ``facts`` and a list ``part``. A
 text is a Jinja template (``{{ result.seed }}``); what is marked *expression* below is a Jinja
 expression without braces. Beside Jinja's own there are the filters ``where``, ``col``, ``opening``
-and ``displayed``, and the functions ``zip``, ``within`` and ``display_unit``.
+and ``displayed``, the functions ``zip``, ``within``, ``degrees`` and ``display_unit``, and
+``colours``.
 
 A part
-    ``section`` or ``heading`` (texts) begins one; ``text``, ``points`` (lists of texts), ``figure``
-    and ``table`` (lists) are added in this order. ``when``: expression, whether it is there.
-    ``each``: expression, or a list; the part is repeated with ``item``, ``index`` and ``last``
-    (``outer``: the item around it). Figures, axes and calls have both, too.
+    ``section`` or ``heading`` (texts) begins one; ``text`` and ``points`` (lists of texts; points
+    may be an expression), ``figure`` and ``table`` (lists) are added in this order. ``when``:
+    expression, whether it is there. ``each``: expression, or a list; the part is repeated with
+    ``item``, ``index`` and ``last`` (``outer``: the item around it). Figures, tables, axes and
+    calls have both, too.
 A table
     ``rows``: expression; ``columns``: lists of heading, field of the row or expression of ``row``,
     and the format of its numbers. Rows that are lists of cells: the field is empty. ``caption``,
@@ -20,7 +22,7 @@ A figure
 A call
     ``do``: a method of the axes (default ``plot``); ``at``: its positional arguments, expressions;
     every other key is an argument: a text, or a list in which a text is an expression. ``color``
-    may name one of `elevon.report.figures.COLOURS`.
+    may name one of `elevon.report.figures.COLOURS`. Or ``calls``: several, repeated together.
 """
 
 from __future__ import annotations
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _Names = Mapping[str, Any]
+_OWN = frozenset({"do", "at", "each", "when", "calls"})
 
 
 def described(
@@ -85,7 +88,8 @@ def _environment() -> jinja2.Environment:
     # Plain texts: the page escapes them.
     made = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=False)  # noqa: S701
     made.filters |= {"where": _where, "col": _column, "opening": _opening, "displayed": to_display}
-    made.globals |= {"zip": zip, "within": _within, "display_unit": display_unit}
+    made.globals |= {"zip": zip, "within": _within, "degrees": np.degrees}
+    made.globals |= {"display_unit": display_unit, "colours": COLOURS}
     return made
 
 
@@ -134,12 +138,18 @@ def _add(report: Report, part: _Names, names: _Names) -> None:
         section.heading(text(part["heading"], names))
     section.text(*(text(paragraph, names) for paragraph in part.get("text", ())))
     if "points" in part:
-        section.points([text(point, names) for point in part["points"]])
+        points = part["points"]
+        section.points(
+            _value(points, names)
+            if isinstance(points, str)
+            else [text(point, names) for point in points]
+        )
     for figure in part.get("figure", ()):
         for inside in _repeated(figure, names):
             section.figure(_figure(figure, inside), text(figure["caption"], inside))
     for table in part.get("table", ()):
-        _table(section, table, names)
+        for inside in _repeated(table, names):
+            _table(section, table, inside)
 
 
 def _table(section: Section, entry: _Names, names: _Names) -> None:
@@ -155,7 +165,7 @@ def _table(section: Section, entry: _Names, names: _Names) -> None:
             marked=frozenset(
                 n for n, row in enumerate(rows) if _value(marked, {**names, "row": row})
             ),
-            formats=[column[2] if len(column) > 2 else "" for column in columns],
+            formats=[text(column[2], names) if len(column) > 2 else "" for column in columns],
             folded=text(entry.get("folded", ""), names),
         )
     )
@@ -188,8 +198,12 @@ def _figure(entry: _Names, names: _Names) -> Figure:
 
 
 def _call(axes: Any, call: _Names, names: _Names) -> None:
-    given = {key: item for key, item in call.items() if key not in {"do", "at", "each", "when"}}
+    given = {key: item for key, item in call.items() if key not in _OWN}
     for inside in _repeated(call, names):
+        if "calls" in call:
+            for one in call["calls"]:
+                _call(axes, one, inside)
+            continue
         options = {key: _argument(key, item, inside) for key, item in given.items()}
         getattr(axes, call.get("do", "plot"))(
             *(_value(item, inside) for item in call.get("at", ())), **options

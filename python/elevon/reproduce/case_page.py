@@ -47,4 +47,5 @@ def case_page(
         names |= getattr(import_module(module), function)(result)
     report = described(page, names, date=date)
     made = {key: text(item, names) for key, item in page.get("made", {}).items()}
-    return closed(report, result.checks, text(page.get("command", name), names), **made)
+    known = {key: item for key, item in made.items() if item}
+    return closed(report, result.checks, text(page.get("command", name), names), **known)

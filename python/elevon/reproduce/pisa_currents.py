@@ -201,3 +201,58 @@ def checks_of(
         Check("weakest braking of a shorted stretch", torque, 0.0, "N m"),
         Check("largest current of the shorted motor over the cut-off", peak / cutoff, 1.02, "1"),
     ]
+
+
+def page_values(result: CommutationResult) -> dict[str, object]:
+    """Return what the page draws: one electrical turn, some carrier periods, the longest short."""
+    value = Actuator.load(ACTUATOR).parameters.value
+    carriers = 6.0 * value("inverter.switching_period")
+    return {
+        "turn": _turn(result.window, value("motor.pole_pairs")),
+        "carrier": _carrier(result.window, carriers),
+        "short": _short(result),
+    }
+
+
+def _legs(**signals: Sequence[Floats]) -> list[dict[str, object]]:
+    """One entry a leg: its name and colour, and its part of each signal."""
+    return [
+        {"leg": leg, "colour": colour, **{name: lines[k] for name, lines in signals.items()}}
+        for k, (leg, colour) in enumerate(zip("abc", ("blue", "orange", "grey"), strict=True))
+    ]
+
+
+def _of_legs(run: Recording, name: str) -> list[Floats]:
+    return [run[f"{name}_{leg}"].values for leg in "abc"]
+
+
+def _turn(run: Recording, poles: float) -> dict[str, object]:
+    turned = np.degrees(poles * np.abs(run["motor_position"].values))
+    first, last = np.searchsorted(run.clock().time, WINDOW).tolist()
+    inside = np.flatnonzero(np.abs(turned[first:last] - turned[first]) < 360.0) + first
+    degrees = electrical(run, poles)[0][inside]
+    order = np.argsort(degrees)
+    hall, current = (
+        [line[inside][order] for line in _of_legs(run, name)] for name in ("hall", "current")
+    )
+    return {"degrees": degrees[order], "legs": _legs(hall=hall, current=current)}
+
+
+def _carrier(run: Recording, span: float) -> dict[str, object]:
+    time = run.clock().time
+    inside = (time > WINDOW[0]) & (time < WINDOW[0] + span)
+    return {
+        "time": 1e3 * (time[inside] - WINDOW[0]),
+        "legs": _legs(voltage=[line[inside] for line in _of_legs(run, "voltage")]),
+        "demand": run["duty"].values[inside] * run["supply_voltage"].values[inside],
+    }
+
+
+def _short(result: CommutationResult) -> dict[str, object]:
+    run, time = result.extension, result.extension.clock().time
+    longest = max(result.pulses, key=lambda pulse: pulse.length, default=None)
+    middle = 0.0 if longest is None else longest.time
+    close = (time > middle - 0.003) & (time < middle + 0.006)
+    currents = _of_legs(run, "current")
+    legs = _legs(current=[line[::4] for line in currents], close=[line[close] for line in currents])
+    return {"time": time[::4], "near": 1e3 * (time[close] - middle), "legs": legs}

@@ -309,3 +309,37 @@ def _checks(rows: Sequence[FrictionRow]) -> list[Check]:
         worst = max(abs(row.recovered - row.put_in) for row in mine) / largest
         checks.append(Check(f"{name}: worst error over the largest", 100.0 * worst, 3.0, "%"))
     return checks
+
+
+def page_values(result: FrictionResult) -> dict[str, object]:
+    """Return what the page draws beside the rows: both directions of a test, each way's preload."""
+
+    def both(released: bool, speed: float) -> list[FrictionTrace]:
+        mine = [t for t in result.traces if t.released == released]
+        return [t for t in mine if abs(t.speed_mm_s - speed) < 1e-9]
+
+    return {
+        "efficiency": [row for row in result.rows if row.quantity == "efficiency"],
+        "both": both,
+        "thin": lambda trace: slice(10, None, max(1, trace.time.size // 1500)),
+        "preload": [_preload(result.rows, *way) for way in _WAYS],
+    }
+
+
+_WAYS = (("extension", "blue", 1.0), ("retraction", "orange", -1.0))
+
+
+def _preload(rows: Sequence[FrictionRow], way: str, colour: str, sign: float) -> dict[str, object]:
+    """Return the apparent efficiency over the speed, and over the friction force."""
+    eta, force = (
+        {r.speed_mm_s: r.recovered for r in rows if (r.quantity, r.direction) == (quantity, way)}
+        for quantity in ("preload_efficiency", "friction_ff")
+    )
+    speeds = sorted(speed for speed in eta if speed is not None)
+    return {
+        "way": way,
+        "colour": colour,
+        "speed": [sign * speed for speed in speeds],
+        "efficiency": [eta[speed] for speed in speeds],
+        "by_friction": sorted((force[speed], eta[speed]) for speed in speeds),
+    }

@@ -10,9 +10,11 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.progress import Progress
 from elevon.recording import Recording
+from elevon.recording.states import code_names
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import (
     ACTUATOR,
+    COMMANDED,
     CONDITIONS,
     FIGURES,
     TEMPERATURES,
@@ -206,3 +208,40 @@ def _row(
         extension,
         retraction,
     )
+
+
+def page_values(result: FunctionalResult) -> dict[str, object]:
+    """Return what the page draws: each condition's strokes, the names of the states."""
+    states = code_names("landing_gear", "state")
+    return {
+        "strokes": [_drawn(row) for row in result.rows],
+        "states": [states[k] for k in range(4)],
+    }
+
+
+def _drawn(row: FunctionalRow) -> dict[str, object]:
+    condition, longest = row.condition, max(row.extension_s, row.retraction_s)
+    moves = [
+        {"name": name, "colour": colour, "line": line, **_thinned(run, longest)}
+        for run, name, colour, line in (
+            (row.extension, "extension", "blue", "-"),
+            (row.retraction, "retraction", "orange", "--"),
+        )
+    ]
+    title = f"{condition.name}: {condition.load_factor:g} g, {condition.supply:g} V"
+    return {"title": title, "longest": longest, "moves": moves}
+
+
+def _thinned(run: Recording, longest: float) -> dict[str, object]:
+    time = run["output_position"].time - COMMANDED
+    thin = np.flatnonzero((time >= 0.0) & (time <= longest + 0.4))[::5]
+    signals = {"ram": "output_position", "speed": "motor_speed", "reference": "speed_ref",
+               "current": "current_mean", "state": "state"}  # fmt: skip
+    ram, load = run["output_position"].values, run["load_force"].values
+    # Beyond the stroke the housing or the lock carries the load.
+    moving = (ram > 1e-4) & (ram < ram.max() - 1e-4)
+    return {
+        "time": time[thin],
+        "loaded": {"ram": ram[moving][::5], "force": load[moving][::5]},
+        **{name: run[signal].values[thin] for name, signal in signals.items()},
+    }

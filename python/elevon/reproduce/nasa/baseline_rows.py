@@ -132,3 +132,27 @@ class BaselineResult:
 def _rounded(value: float, digits: int) -> float | None:
     """A number at the resolution of its column; None where there is none."""
     return None if np.isnan(value) else round(value, digits) + 0.0
+
+
+def page_values(result: BaselineResult) -> dict[str, object]:
+    """Return the current of each run at 50 mm and 6 cm/s over its load, by profile."""
+    from elevon.reproduce.nasa.baseline import DRIFT
+
+    middle = [
+        row
+        for row in result.rows
+        if abs(row.profile.amplitude - 0.05) < 1e-9 and abs(row.profile.rate - 0.06) < 1e-9
+    ]
+    names = dict.fromkeys(row.profile.name for row in result.rows)
+    currents = []
+    for place, (name, colour) in enumerate(zip(names, _COLOURS, strict=False)):
+        runs = [(row.load, run[0]) for row in middle if row.profile.name == name
+                for run in row.runs]  # fmt: skip
+        if runs:
+            load, current = np.array(runs).T
+            load = load / 1e3 + 0.06 * (place - 2)
+            currents.append({"name": name, "colour": colour, "load": load, "current": current})
+    return {"currents": currents, "drift": DRIFT}
+
+
+_COLOURS = ("grey", "blue", "orange", "green", "red")

@@ -340,3 +340,14 @@ def _loss_error(
         lost = [float(np.mean(m[settled] - e[settled])) for m, e in (bench, model)]
         errors.append(lost[1] - lost[0])
     return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def page_values(_result: DropsResult) -> dict[str, object]:
+    """Return mean diameter and number of coils of the load module's springs over the wire [mm]."""
+    from elevon.bench.spring import STANDARD_WIRES, SpringTask, design_spring
+
+    task = SpringTask()
+    wires = [float(wire) for wire in STANDARD_WIRES if 2e-3 <= wire <= 4e-3]
+    largest = 1e3 * np.array([task.largest_coil(wire) for wire in wires])
+    coils = [design_spring(task, wire=wire).coils for wire in wires]
+    return {"springs": {"wire": 1e3 * np.array(wires), "largest": largest, "coils": coils}}

@@ -240,8 +240,7 @@ def fitted_sine(time: Floats, values: Floats, *, late: float) -> tuple[float, fl
     instants, signal = time[used], values[used]
 
     def fit(frequency: float) -> tuple[float, Floats]:
-        angle = 2.0 * np.pi * frequency * instants
-        design = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
+        design = _waves(instants, frequency)
         weights = np.linalg.lstsq(design, signal, rcond=None)[0]
         return float(np.mean((design @ weights - signal) ** 2)), weights
 
@@ -251,3 +250,41 @@ def fitted_sine(time: Floats, values: Floats, *, late: float) -> tuple[float, fl
                             options={"xatol": 1e-9})  # fmt: skip
     weights = fit(float(best.x))[1]
     return float(np.hypot(weights[1], weights[2])), float(best.x)
+
+
+def _waves(time: Floats, frequency: float) -> Floats:
+    angle = 2.0 * np.pi * frequency * time
+    return np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
+
+
+def page_values(result: TorinoValidation) -> dict[str, object]:
+    """Return two periods of each curve, one extreme of the first, and the factor to rpm."""
+    late = [_late(curve, START, 10.0) for curve in result.curves]
+    top = result.curves[0].time[_part(result.curves[0], START, 5.0)]
+    encoder = result.curves[0].bench["encoder_position"][_part(result.curves[0], START, 5.0)]
+    extreme = _late(result.curves[0], float(top[np.argmax(encoder)]) - 0.3, 0.8)
+    return {"late": late, "extreme": extreme, "rpm": 30.0 / np.pi}
+
+
+def _part(curve: ValidationCurves, start: float, span: float) -> slice:
+    return slice(*np.searchsorted(curve.time, [start, start + span]).tolist())
+
+
+def _late(curve: ValidationCurves, start: float, span: float) -> dict[str, object]:
+    """Return a part of a curve, with the sine nearest to its command."""
+    part = _part(curve, start, span)
+    sides = {
+        name: {signal: values[part] for signal, values in side.items()}
+        for name, side in (("bench", curve.bench), ("model", curve.model))
+    }
+    return {"reading": curve.reading, "time": curve.time[part], "command": curve.command[part],
+            "fitted": _sine(curve)[part], **sides}  # fmt: skip
+
+
+def _sine(curve: ValidationCurves) -> Floats:
+    """Return the sine nearest to the command, on the log's clock."""
+    _, frequency = fitted_sine(curve.time, curve.command, late=START)
+    design = _waves(curve.time, frequency)
+    late = curve.time >= START
+    weights = np.linalg.lstsq(design[late], curve.command[late], rcond=None)[0]
+    return np.asarray(design @ weights)
