@@ -189,7 +189,7 @@ class Chain:
         monkeypatch.setattr(sys.modules["elevon.simulate"], "simulate", counted)
         replaced = {
             "elevon.reproduce.backlash.reproduce_backlash": self.backlash,
-            "elevon.reproduce.backlash.page.backlash_report": lambda _result: Report("backlashes"),
+            "elevon.reproduce.case_page.case_page": lambda _name, _result: Report("backlashes"),
             "elevon.logs.read.log_of": lambda path: path,
             "elevon.demo.run.import_log": lambda path, **_options: path,
             "elevon.demo.run.same_rate": lambda _logs: None,

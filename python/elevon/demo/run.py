@@ -170,13 +170,13 @@ def _claim(demo: Demo, *, force: bool) -> None:
 
 def _backlash(demo: Demo, progress: Progress | None) -> None:
     from elevon.reproduce.backlash import reproduce_backlash
-    from elevon.reproduce.backlash.page import backlash_report
+    from elevon.reproduce.case_page import case_page
 
     page = demo.folder / "backlash.html"
 
     def work() -> Backlashes:
         result = reproduce_backlash(progress=progress)
-        backlash_report(result).save(page, force=True, links=False)
+        case_page("torino-backlash", result).save(page, force=True, links=False)
         return Backlashes.of(result)
 
     demo.backlash = demo.resumed(

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _Names = Mapping[str, Any]
-_OWN = frozenset({"do", "at", "each", "when", "calls"})
+_CONTROL = frozenset({"do", "at", "each", "when", "calls"})
 
 
 def described(
@@ -198,7 +198,7 @@ def _figure(entry: _Names, names: _Names) -> Figure:
 
 
 def _call(axes: Any, call: _Names, names: _Names) -> None:
-    given = {key: item for key, item in call.items() if key not in _OWN}
+    given = {key: item for key, item in call.items() if key not in _CONTROL}
     for inside in _repeated(call, names):
         if "calls" in call:
             for one in call["calls"]:

@@ -232,3 +232,26 @@ def _row(printed: WeightDrop, repaired: WeightDrop) -> dict[str, Any]:
         "encoder_repaired_deg": repaired.encoder_deg,
         "loss_repaired_deg": repaired.loss_deg,
     }
+
+
+def page_values(result: ComplianceResult) -> dict[str, object]:
+    """Return stiffness and interval [N m/rad], and what the page draws over the load."""
+    fit, (low, high) = result.robust, result.interval
+    load = np.array([0.0, 52.0])
+    printed_load, printed_loss = (column.mean() for column in _columns(result.printed))
+    return {
+        "stiffness": fit.stiffness * NM_PER_RAD,
+        "per_degree": fit.stiffness * NM_PER_RAD * np.pi / 180,
+        "low": low * NM_PER_RAD,
+        "high": high * NM_PER_RAD,
+        "changed": [a for a, b in zip(result.printed, result.repaired, strict=True)
+                    if (a.load_n, a.loss_deg) != (b.load_n, b.loss_deg)],
+        "first": [drop for drop in result.repaired if drop.drop == 1],
+        "later": [drop for drop in result.repaired if drop.drop != 1],
+        "lines": {
+            "load": load,
+            "robust": fit.offset + load / fit.stiffness,
+            "published": printed_loss
+            + (load - printed_load) / result.variants[0].load_on_loss,
+        },
+    }  # fmt: skip
