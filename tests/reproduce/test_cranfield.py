@@ -7,9 +7,9 @@ import pytest
 
 from elevon.cli import main
 from elevon.errors import InputError
+from elevon.reproduce.case_page import case_page
 from elevon.reproduce.cranfield import read_folder
 from elevon.reproduce.cranfield.detection import detect
-from elevon.reproduce.cranfield.page import cranfield_report
 from elevon.reproduce.cranfield.protocols import leave_load_out, leave_run_out
 from elevon.reproduce.cranfield.result import evaluate
 from tests.diagnose.cycles import CLASSES, HEADER, write_condition
@@ -78,7 +78,7 @@ def test_figures_of_made_up_faults(data):
     assert {row["load_kgf"] for row in values["rows"]} == {"-40", "20", "40", "mean", "worst"}
     assert all(0.0 <= row["low"] <= row["high"] <= 1.0 for row in values["rows"])
     json.dumps(values, allow_nan=False)
-    page = cranfield_report(result).html()
+    page = case_page("cranfield", result, options={"seed": 0}).html()
     assert page.index("distinguished with") < page.index("<svg")
 
 

@@ -21,7 +21,7 @@ from elevon.errors import RangeError, SimulationError
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.report.checks import Check
-from elevon.reproduce.nasa.baseline_rows import MEASURES, BaselineResult, BaselineRow
+from elevon.reproduce.nasa.baseline_rows import DRIFT, MEASURES, BaselineResult, BaselineRow
 from elevon.reproduce.nasa.capability import Capability
 from elevon.reproduce.nasa.corners import corner_rows
 from elevon.reproduce.nasa.design import (
@@ -51,9 +51,6 @@ SETTLE = 2.0
 """Statistics begin here [s]."""
 HISTORY = 30.0
 """Time at which every run's winding is read [s]: equal histories, whatever a run's length."""
-DRIFT = 4.0
-"""The laboratory warms by so much during a block [K] (ASSUMED): random order keeps it out of the
-effects."""
 RECORD = "command,output_position,current_a,current_b,current_c,winding_temperature,limited@1 kHz"
 SOLVER = {"solver.step": 5e-6}
 BATCH = 16
