@@ -14,6 +14,7 @@ from elevon.bench.stand import ChannelSpec, Stand
 from elevon.bench.steps import SensorStep
 from elevon.errors import InputError
 from elevon.recording import Recording
+from elevon.simulate import solver_step
 from elevon.units import parse_quantity
 
 LOAD_CHANNEL = "rig_force"
@@ -25,6 +26,24 @@ _CUTOFF = 0.4  # of the log's rate
 _ORDER = 4
 _FITTED = {"vibration": "vibration.model"}
 _DIGITAL = ("command", "_ref")
+
+
+def acquired(
+    actuator: Actuator, fidelity: str, stand: Stand, rate: float, seconds: float
+) -> tuple[dict[str, str], str]:
+    """Return role to signal of what a stand records, and what a run keeps for it.
+
+    Parameters
+    ----------
+    actuator, fidelity, stand
+        What stands where, and how it is run.
+    rate, seconds : float
+        Of the log [Hz, s].
+    """
+    step = solver_step(actuator, fidelity)
+    steps = internal_steps(rate, step, seconds)
+    roles = acquired_signals(actuator, fidelity, stand)
+    return roles, f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz"
 
 
 def acquired_signals(actuator: Actuator, fidelity: str, stand: Stand) -> dict[str, str]:

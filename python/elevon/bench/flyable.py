@@ -16,7 +16,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
+from elevon.bench.acquisition import acquire, acquired
 from elevon.bench.force_control import ForceLoop
 from elevon.bench.loaded import waveform_values, write_loaded
 from elevon.bench.stand import Stand, stand_of
@@ -26,7 +26,7 @@ from elevon.files import check_output
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario import Scenario
-from elevon.simulate import Run, simulate_batch, solver_step
+from elevon.simulate import Run, simulate_batch
 from elevon.worklog import locked, sweep
 
 UNITS = ("nominal", "faulty")
@@ -126,19 +126,15 @@ def fly(
         A run did not reach its end.
     """
     stand, aircraft = stand_of(actuator.wiring), conditions or FlightConditions()
-    loaded = flight.loads.output.terms
-    _check(actuator, stand, switch, loaded=bool(loaded))
+    _check(actuator, stand, switch, loaded=bool(flight.loads.output.terms))
     time = np.arange(0.0, flight.seconds + _GRID, _GRID)
     mass = actuator.parameters.value("load.mass")
     inertial = mass * _acceleration(aircraft, time, seed)
     forces = [force + inertial for force in _forces(stand, flight, time, switch)]
     scenarios = [_scenario(flight, time, force, aircraft) for force in forces]
     scenarios[1] = scenarios[1].with_faults(list(faults))
-    hertz = stand.hertz(None if rate is None else rate)
-    step = solver_step(actuator, fidelity)
-    steps = internal_steps(hertz, step, flight.seconds)
-    roles = acquired_signals(actuator, fidelity, stand)
-    record = f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz"
+    hertz = stand.hertz(rate)
+    roles, record = acquired(actuator, fidelity, stand, hertz, flight.seconds)
     runs = [Run(actuator, scenario, seed + k, name)
             for k, (name, scenario) in enumerate(zip(UNITS, scenarios, strict=True))]  # fmt: skip
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,11 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.bench.acquisition import acquire, acquired_signals, internal_steps
+from elevon.bench.acquisition import acquire, acquired
 from elevon.bench.force_control import ForceLoop, target_force
 from elevon.bench.procedure import Procedure
 from elevon.bench.rating import SHARE, holds, rated_factor
-from elevon.bench.rig import Conditions, draw_conditions, moved
+from elevon.bench.rig import BenchSetup, Conditions, draw_conditions, moved, moved_command
 from elevon.bench.stand import Stand
 from elevon.bench.steps import ForceStep, RigStep, SensorStep, SettingsStep, TraceStep
 from elevon.errors import DivergedError, InputError, unknown
@@ -34,40 +35,40 @@ _PASSES = 2  # runs of the reduced-order model from which the force is computed
 
 
 @dataclass(frozen=True)
-class LoadedSetup:
-    """One log about to be recorded.
+class LoadedSetup(BenchSetup):
+    """One log under a load actuator about to be recorded; the load is added when it is known.
 
     Attributes
     ----------
-    trace : TraceStep
-        The step.
-    actuator : Actuator
-        With the stand's and the operator's settings.
-    scenario : Scenario
-        Command and faults; the load is added when it is known.
-    conditions : Conditions
-        What chance set.
     stand : Stand
         Where it stands.
     force : ForceStep or None
         What the load actuator is commanded; None: nothing, or the rig moves the output.
     settings : dict
         What the operator set, by parameter.
-    factor : float
-        Of the commanded force: below one where the drive could not hold what is asked for.
     sensors : tuple of SensorStep
         What is wrong with the stand's own sensors.
     """
 
-    trace: TraceStep
-    actuator: Actuator
-    scenario: Scenario
-    conditions: Conditions
     stand: Stand
     force: ForceStep | None
     settings: dict[str, Any]
-    factor: float = 1.0
     sensors: tuple[SensorStep, ...] = ()
+
+    @cached_property
+    def factor(self) -> float:
+        """Of the commanded force: below one where the drive could not hold what is asked for."""
+        force, command, most = self.force, self.trace.command, SHARE * holds(self.actuator)
+        if force is None or command.mode != "position" or not np.isfinite(most):
+            return 1.0
+        times = np.arange(0.0, parse_quantity(self.trace.duration, "s", "duration"), 10.0 * _GRID)
+        terms = waveform_values(force.terms, times, self.conditions.start)
+        return rated_factor(force, terms, waveform_values(command.terms, times, 0.0, "m"), most)
+
+    @property
+    def scaled(self) -> dict[str, object]:
+        """The factor, where it is below one."""
+        return {} if self.factor == 1.0 else {"force_factor": self.factor}
 
     @property
     def message(self) -> str:
@@ -81,17 +82,11 @@ class LoadedSetup:
 
     def truth(self) -> dict[str, object]:
         """Return what the log does not state."""
-        parameters = self.actuator.parameters
-        return {
-            "name": self.trace.name,
+        return super().truth() | {
             "stand": self.stand.name,
-            "parameter_hash": self.actuator.hash,
-            "parameters": {path: entry.value for path, entry in parameters.items()},
-            "conditions": asdict(self.conditions),
-            "faults": [fault.to_dict() for fault in self.scenario.fault],
             "force": None if self.force is None else self.force.model_dump(mode="json"),
             "rate": self.stand.hertz(self.trace.rate),
-            **({} if self.factor == 1.0 else {"force_factor": self.factor}),
+            **self.scaled,
         }
 
 
@@ -129,13 +124,10 @@ def loaded_setups(
         elif isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(logs))
             ready = actuator.with_values(settings, source="set on the bench", place=step.name)
-            scenario = _scenario(step, ready, rig, conditions, faults)
-            force_step = None if rig else force
-            factor = _rated(force_step, step, ready, conditions)
             logs.append(
                 LoadedSetup(
-                    step, ready, scenario, conditions, stand, force_step, dict(settings), factor,
-                    tuple(sensors.values()),
+                    step, ready, _scenario(step, ready, rig, conditions, faults), conditions, stand,
+                    None if rig else force, dict(settings), tuple(sensors.values()),
                 )
             )  # fmt: skip
         else:
@@ -144,18 +136,6 @@ def loaded_setups(
                 f"{'rig, ' if 'rig_speed' in stand.ports else ''}settings, sensor, trace"
             )
     return logs
-
-
-def _rated(
-    force: ForceStep | None, step: TraceStep, actuator: Actuator, conditions: Conditions
-) -> float:
-    """Return the factor of the loads with which the drive holds them."""
-    most = SHARE * holds(actuator)
-    if force is None or step.command.mode != "position" or not np.isfinite(most):
-        return 1.0
-    times = np.arange(0.0, parse_quantity(step.duration, "s", "duration"), 10.0 * _GRID)
-    terms = waveform_values(force.terms, times, conditions.start)
-    return rated_factor(force, terms, waveform_values(step.command.terms, times, 0.0, "m"), most)
 
 
 def _scenario(
@@ -167,7 +147,7 @@ def _scenario(
 ) -> Scenario:
     data: dict[str, Any] = {
         "duration": parse_quantity(step.duration, "s", "duration"),
-        "command": _command(step, conditions.start),
+        "command": moved_command(step, conditions.start),
         "initial": dict(step.initial) or _begin(step, actuator, conditions.start),
     }
     if rig:
@@ -185,16 +165,6 @@ def _begin(step: TraceStep, actuator: Actuator, start: float) -> dict[str, Any]:
     at = float(waveform_values(step.command.terms, np.zeros(1), start, "m")[0])
     turned = at * known.value("gear.ratio") / known.value("screw.lead")
     return {} if at == 0.0 else {"motor_position": turned, "output_position": at}
-
-
-def _command(step: TraceStep, start: float) -> dict[str, Any]:
-    """Return the step's command, moved to its start."""
-    data: dict[str, Any] = step.command.model_dump(exclude_unset=True, mode="json")
-    if "terms" in data:
-        data["terms"] = [moved(term, start) for term in data["terms"]]
-    for action in data.get("steps", []):
-        action["time"] = parse_quantity(action["time"], "s", "time") + start
-    return data
 
 
 def run_loaded(
@@ -226,10 +196,8 @@ def run_loaded_batch(
     if len(rates) != 1:
         raise InputError(f"a batch of logs needs one rate, not {sorted(rates)}")
     rate, first = rates.pop(), setups[0]
-    step = solver_step(first.actuator, fidelity)
-    steps = internal_steps(rate, step, max(s.scenario.seconds for s in setups))
-    roles = acquired_signals(first.actuator, fidelity, first.stand)
-    record = f"{','.join(dict.fromkeys(roles.values()))}@{1.0 / (steps * step):.12g} Hz"
+    seconds = max(setup.scenario.seconds for setup in setups)
+    roles, record = acquired(first.actuator, fidelity, first.stand, rate, seconds)
     forces = _forces(setups)
     runs = _simulated(setups, [s for _, _, s in forces], fidelity, record, progress)
     out = []
@@ -282,7 +250,7 @@ def _meta(setup: LoadedSetup, run: Recording) -> dict[str, Any]:
             "name": setup.stand.name,
             "text": setup.stand.text,
             "parameters": setup.settings,
-            **({} if setup.factor == 1.0 else {"force_factor": setup.factor}),
+            **setup.scaled,
             "initial": dict(setup.trace.initial),
             "rig_moves": bool(setup.scenario.loads.rig_speed.terms),
         },

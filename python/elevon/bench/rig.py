@@ -70,7 +70,7 @@ class Rig:
 
 
 @dataclass(frozen=True)
-class Setup:
+class BenchSetup:
     """One log about to be recorded.
 
     Attributes
@@ -78,26 +78,20 @@ class Setup:
     trace : TraceStep
         The step.
     actuator : Actuator
-        With the backlash and the settings of the steps before it.
+        With the settings of the stand and of the operator.
     scenario : Scenario
-        Command, loads and faults on the drive's clock.
+        Command, loads as far as they are known, faults.
     conditions : Conditions
         What chance set.
-    rig : Rig
-        The bench.
-    brake : BrakeRun or None
-        None while the brake is off.
     """
 
     trace: TraceStep
     actuator: Actuator
     scenario: Scenario
     conditions: Conditions
-    rig: Rig
-    brake: BrakeRun | None
 
     def truth(self) -> dict[str, object]:
-        """Return what the log's reader does not know."""
+        """Return what the log does not state."""
         parameters = self.actuator.parameters
         return {
             "name": self.trace.name,
@@ -105,8 +99,30 @@ class Setup:
             "parameters": {path: entry.value for path, entry in parameters.items()},
             "conditions": asdict(self.conditions),
             "faults": [fault.to_dict() for fault in self.scenario.fault],
+        }
+
+
+@dataclass(frozen=True)
+class Setup(BenchSetup):
+    """One log of the rotary bench about to be recorded.
+
+    Attributes
+    ----------
+    rig : Rig
+        The bench as it stands.
+    brake : BrakeRun or None
+        What its brake does.
+    """
+
+    rig: Rig
+    brake: BrakeRun | None
+
+    def truth(self) -> dict[str, object]:
+        """Return what the log does not state."""
+        springs = self.rig.springs
+        return super().truth() | {
             "brake": asdict(self.rig.equipment),
-            "radial_force_n": self.rig.springs.radial_force if self.rig.springs else 0.0,
+            "radial_force_n": springs.radial_force if springs else 0.0,
         }
 
 
@@ -199,7 +215,7 @@ def _setup(
     scenario = Scenario.from_dict(
         {
             "duration": duration,
-            "command": _command(step, conditions.start),
+            "command": moved_command(step, conditions.start),
             "load": _loads(rig, brake, conditions, ready),
             "initial": _initial(ready, conditions),
         },
@@ -243,10 +259,13 @@ def _loads(
     return {"brake": {"terms": resist}, "output": {"terms": output}}
 
 
-def _command(step: TraceStep, start: float) -> dict[str, Any]:
-    """Return the step's command, moved to its start."""
-    data = step.command.model_dump(exclude_unset=True, mode="json")
-    data["terms"] = [moved(term, start) for term in data.get("terms", [])]
+def moved_command(step: TraceStep, start: float) -> dict[str, Any]:
+    """Return a step's command, its waveforms and actions later by `start` [s]."""
+    data: dict[str, Any] = step.command.model_dump(exclude_unset=True, mode="json")
+    if "terms" in data:
+        data["terms"] = [moved(term, start) for term in data["terms"]]
+    for action in data.get("steps", []):
+        action["time"] = parse_quantity(action["time"], "s", "time") + start
     return data
 
 

@@ -19,8 +19,13 @@ def time_name(recording: Recording, clock: str) -> str:
     return "time" if len(recording.clocks) == 1 else f"time_{clock}"
 
 
-def to_pandas(recording: Recording, clock: str | None, *, units: bool = False) -> pd.DataFrame:
-    """See `Recording.to_pandas`."""
+def to_pandas(
+    recording: Recording, clock: str | None = None, *, units: bool = False
+) -> pd.DataFrame:
+    """Return one clock's channels as a table indexed by time (s); units in ``attrs``.
+
+    With `units` they also stand in the columns' names: ``output_position [rad]``.
+    """
     import pandas as pd
 
     base = recording.clock(clock)
@@ -33,7 +38,10 @@ def to_pandas(recording: Recording, clock: str | None, *, units: bool = False) -
 
 
 def to_xarray(recording: Recording) -> xr.Dataset:
-    """See `Recording.to_xarray`."""
+    """Return all channels as a dataset, one time dimension a clock, units as attributes.
+
+    The dimension is ``time`` for a single clock, ``time_NAME`` for each of several.
+    """
     import xarray as xr
 
     coordinates, variables = {}, {}
@@ -49,8 +57,8 @@ def to_xarray(recording: Recording) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, {"elevon": Header.sealed(recording).to_json()})
 
 
-def to_arrow(recording: Recording, clock: str | None) -> pa.Table:
-    """See `Recording.to_arrow`."""
+def to_arrow(recording: Recording, clock: str | None = None) -> pa.Table:
+    """Return one clock's time and channels as an Arrow table, units in the field metadata."""
     import pyarrow as pa
 
     base = recording.clock(clock)

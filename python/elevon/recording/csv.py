@@ -213,7 +213,7 @@ def joined_tables(path: Path) -> list[Path]:
     return []
 
 
-def load(path: Path, max_bytes: int) -> Contents:
+def read(path: Path, max_bytes: int) -> Contents:
     """Read a table, or the tables of the clocks that were saved as `path`."""
     parts = joined_tables(path)
     if not parts:
@@ -265,7 +265,7 @@ def _read(path: Path, max_bytes: int) -> tuple[Contents, str]:
             f"{path}: no {description_path(path).name} beside it, so no checksum: "
             "damage cannot be seen",
             UncheckedWarning,
-            6,
+            5,
         )
         return contents, ""
     if len(about.header.clocks) != 1:

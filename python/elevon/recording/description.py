@@ -62,7 +62,7 @@ def write_description(table: Path, about: TableDescription, *, keep_old: bool) -
     content = _content(about)
     if keep_old:
         with suppress(InputError, OSError):
-            old = _document(table)
+            old = _parsed(description_path(table))
             old.pop("replaces", None)
             content["replaces"] = _matching(table) or old
     with journal():  # the table is what was written, not this
@@ -120,16 +120,12 @@ def _content(about: TableDescription) -> dict[str, Any]:
 
 def _matching(table: Path) -> dict[str, Any] | None:
     """Return the description, or the one it replaces, whose SHA-256 is that of the table."""
-    content = _document(table)
+    content = _parsed(description_path(table))
     present = sha256_of(table)
     for entry in (content, content.get("replaces")):
         if isinstance(entry, Mapping) and entry.get("sha256") == present:
             return dict(entry)
     return None
-
-
-def _document(table: Path) -> dict[str, Any]:
-    return _parsed(description_path(table))
 
 
 def _parsed(path: Path) -> dict[str, Any]:

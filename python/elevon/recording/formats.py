@@ -4,43 +4,66 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
 from elevon.errors import FormatError, InputError, UnknownNameError, nearest, unknown
 from elevon.files import atomic_path, check_output
+from elevon.recording import csv
 from elevon.recording.contents import Contents
+from elevon.recording.description import description_path
 
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
-ENDINGS = (".parquet", ".nc", ".csv", ".mat")
+_MODULES = {".parquet": "parquet", ".nc": "netcdf", ".csv": "csv", ".mat": "mat"}
+ENDINGS = tuple(_MODULES)
 
 
 class _Format(Protocol):
-    def check(self, recording: Recording) -> None:
-        """Refuse what the format cannot hold, before anything is written."""
+    """What each format module offers."""
 
     def write(self, recording: Recording, path: Path) -> None:
-        """Write to a fresh temporary path."""
+        """Write to a new file; `InputError` if the recording does not fit."""
 
     def read(self, path: Path, max_bytes: int) -> Contents:
-        """Read a file that nobody vouches for."""
+        """Read it back."""
 
 
-def save(recording: Recording, path: str | os.PathLike[str], *, force: bool) -> Path:
-    """Write a recording; see `Recording.save`."""
+def save(recording: Recording, path: str | os.PathLike[str], *, force: bool = False) -> Path:
+    """Write the recording to a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        The ending chooses the format: ``.parquet``, ``.nc``, ``.mat`` (version 5, at most
+        2 GB), ``.csv`` (a plain table with ``NAME.csv.json`` beside it; several clocks: one
+        table ``NAME.CLOCK.csv`` each). All give back every bit on load.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    UnknownNameError
+        Another ending.
+    InputError
+        Something this format cannot hold.
+    OutputError
+        The file exists already or cannot be written.
+    """
     target = Path(path).expanduser()
     if check_ending(target) == ".csv":
-        from elevon.recording import csv
-
         csv.save(recording, target, force=force)
         return target
-    handler = _handler(target)
     check_output(target, force=force)
-    handler.check(recording)
     with atomic_path(target, force=force) as temporary:
-        handler.write(recording, temporary)
+        _format(target).write(recording, temporary)
     return target
 
 
@@ -52,26 +75,15 @@ def load(path: str | os.PathLike[str], *, max_bytes: int) -> Contents:
         if not files_of(source):
             near = _neighbours(source)
             raise InputError(f"{source}: no such file{near}")
-        return _read(source, max_bytes)
+        return _format(source).read(source, max_bytes)
     except OSError as error:
         raise FormatError(f"{source}: cannot be read: {error}") from error
-
-
-def _read(source: Path, max_bytes: int) -> Contents:
-    if source.suffix.lower() == ".csv":
-        from elevon.recording import csv
-
-        return csv.load(source, max_bytes)
-    return _handler(source).read(source, max_bytes)
 
 
 def files_of(path: Path) -> list[Path]:
     """Return the files of a saved recording: a CSV has a description beside each table."""
     if path.suffix.lower() != ".csv":
         return [path] if path.is_file() else []
-    from elevon.recording import csv
-    from elevon.recording.description import description_path
-
     parts = [path] if path.is_file() else csv.joined_tables(path)
     return [file for table in parts for file in (table, description_path(table)) if file.is_file()]
 
@@ -87,8 +99,6 @@ def check_target(path: Path, clocks: Iterable[str], *, force: bool) -> None:
         A file exists already (a CSV has one a clock, each with a description), or cannot be made.
     """
     if check_ending(path) == ".csv":
-        from elevon.recording import csv
-
         csv.check(path, clocks, force=force)
     else:
         check_output(path, force=force)
@@ -108,19 +118,9 @@ def check_ending(path: str | os.PathLike[str]) -> str:
     return suffix
 
 
-def _handler(path: Path) -> _Format:
-    suffix = check_ending(path)
-    if suffix == ".parquet":
-        from elevon.recording import parquet
-
-        return parquet
-    if suffix == ".nc":
-        from elevon.recording import netcdf
-
-        return netcdf
-    from elevon.recording import mat
-
-    return mat
+def _format(path: Path) -> _Format:
+    name = _MODULES[check_ending(path)]
+    return cast("_Format", import_module(f"elevon.recording.{name}"))
 
 
 def _unknown_ending(path: Path, endings: tuple[str, ...]) -> UnknownNameError:

@@ -45,6 +45,7 @@ def check(recording: Recording) -> None:
 
 def write(recording: Recording, path: Path) -> None:
     """Write the structs."""
+    check(recording)
     content: dict[str, Any] = {"elevon": Header.sealed(recording).to_json()}
     content["units"] = {channel.name: channel.unit for channel in recording.channels}
     for clock in recording.clocks.values():

@@ -28,11 +28,6 @@ if TYPE_CHECKING:
     from elevon.recording.recording import Recording
 
 
-def check(recording: Recording) -> None:
-    """NetCDF holds every recording."""
-    del recording
-
-
 def write(recording: Recording, path: Path) -> None:
     """Write the description, the times and the channels.
 

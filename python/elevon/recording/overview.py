@@ -124,14 +124,9 @@ def _position(recording: Recording, output: Channel, command: Channel | None) ->
         scaled = _over_ratio(motor, output)
         if scaled is not None:
             text, values = scaled
-            lines[f"{motor.name} {text}"] = _displayed(values, unit)
+            lines[f"{motor.name} {text}"] = np.asarray(to_display(values, unit), dtype=np.float64)
     lines[output.name] = output.to(unit)
     return _panel("position", unit, output, lines)
-
-
-def _displayed(values: Floats, unit: str) -> Floats:
-    """Return SI values in another unit."""
-    return np.asarray(to_display(values, unit), dtype=np.float64)
 
 
 def _over_ratio(motor: Channel, output: Channel) -> tuple[str, Floats] | None:

@@ -29,11 +29,6 @@ if TYPE_CHECKING:
 _GROUP = 2**18
 
 
-def check(recording: Recording) -> None:
-    """Parquet holds every recording."""
-    del recording
-
-
 def write(recording: Recording, path: Path) -> None:
     """Write all clocks, row group after row group."""
     import pyarrow.parquet as pq

@@ -12,7 +12,8 @@ import numpy as np
 from elevon.errors import InputError, unknown
 from elevon.files import atomic_path, check_output, write_text
 from elevon.recording.channel import Channel
-from elevon.recording.overview import Band, Panel, bands, overlaid, overview, spectra
+from elevon.recording.overview import Band, Panel, bands, overlaid, overview
+from elevon.recording.overview import spectra as spectra_of
 from elevon.units import display_unit
 
 if TYPE_CHECKING:
@@ -29,16 +30,51 @@ _MOST_POINTS = 100_000
 
 def plot(
     recording: Recording,
-    names: Iterable[str] | None,
-    path: str | os.PathLike[str] | None,
+    names: Iterable[str] | None = None,
+    path: str | os.PathLike[str] | None = None,
     *,
-    units: Mapping[str, str],
-    title: str | None,
-    compare: tuple[str, Recording] | None,
-    with_spectra: bool,
-    force: bool,
+    units: Mapping[str, str] = _NONE,
+    title: str | None = None,
+    compare: Recording | str | os.PathLike[str] | None = None,
+    spectra: bool = False,
+    force: bool = False,
 ) -> Figure | Path:
-    """See `Recording.plot`."""
+    """Plot a run: command against output, error, current, speed, faults and states marked.
+
+    With names, or where nothing says what is what: one panel for each unit and clock.
+
+    Parameters
+    ----------
+    names : iterable of str, optional
+        Channels; by default what shows how the run went, by the roles of the channels.
+    path : path, optional
+        ``.png``, ``.svg`` or ``.pdf`` for a picture, ``.html`` for one self-contained
+        interactive page. Without it the matplotlib figure is returned and nothing written.
+    units : mapping of str to str, optional
+        Channel name to the unit displayed; default degrees, rpm and degC for angles, angular
+        speeds and temperatures, else SI.
+    title : str, optional
+        Title; default the actuator's name.
+    compare : Recording or path, optional
+        Another run, drawn over this one: healthy beside faulty.
+    spectra : bool
+        Add the amplitude spectra of error, current and speed.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    Figure or Path
+        The figure, or the file written.
+
+    Raises
+    ------
+    UnknownNameError
+        Unknown channel or file ending.
+    OutputError
+        The file exists already or cannot be written.
+    """
+    names = None if names is None else list(names)
     suffix = None if path is None else Path(path).suffix.lower()
     if suffix is not None and suffix not in (*PICTURES, ".html"):
         raise unknown("ending of a plot", suffix, (*PICTURES, ".html"), str(path))
@@ -48,11 +84,14 @@ def plot(
     panels = panels_of(recording, names, units)
     marked = bands(recording)
     if compare is not None:
-        name, other = compare
+        if isinstance(compare, (str, os.PathLike)):
+            name, other = Path(compare).name, type(recording).load(compare)
+        else:
+            name, other = str(compare.meta.get("label") or "other"), compare
         panels = overlaid(panels, panels_of(other, names, units), name)
         marked += [item for item in bands(other) if item.kind == "fault" and item not in marked]
-    if with_spectra:
-        panels = panels + spectra(panels)
+    if spectra:
+        panels = panels + spectra_of(panels)
     if path is not None and suffix == ".html":
         return write_text(path, _page(panels, marked, heading), force=force)
     figure = _figure(panels, marked, heading)

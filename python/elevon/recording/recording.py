@@ -2,25 +2,20 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.errors import FormatError, InputError, unknown
+from elevon.errors import FormatError, InputError, did_you_mean, unknown
 from elevon.recording.channel import Channel, in_si
 from elevon.recording.channel_set import ChannelSet
 from elevon.recording.clock import Clock
+from elevon.recording.convert import to_arrow, to_pandas, to_xarray
+from elevon.recording.formats import load, save
 from elevon.recording.header import Header, plain
-from elevon.recording.roles import channel_of, roles_of
-from elevon.recording.window import cut
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import pyarrow as pa
-    import xarray as xr
-    from matplotlib.figure import Figure
+from elevon.recording.old import warn_of_old_names
+from elevon.recording.plot import plot
 
 MAX_BYTES = 8 * 2**30
 
@@ -134,12 +129,23 @@ class Recording(ChannelSet):
 
     @property
     def roles(self) -> dict[str, str]:
-        """Role (``"motor_speed"``) to channel name; empty where nothing says what is what."""
-        return roles_of(self)
+        """Role (``"motor_speed"``) to channel name; empty where nothing says what is what.
+
+        A simulated recording has it from its wiring, a log from its column map: ``meta["roles"]``.
+        """
+        stated = self.meta.get("roles")
+        if not isinstance(stated, Mapping):
+            return {}
+        return {str(role): str(name) for role, name in stated.items() if name in self}
 
     def role(self, name: str) -> Channel:
-        """Return the channel that has a role; `InputError` where none does."""
-        return channel_of(self, name)
+        """Return the channel that has a role; `InputError` where none does, with those played."""
+        roles = self.roles
+        if name not in roles:
+            known = ", ".join(roles) or "none: say them in a column map"
+            hint = did_you_mean(name, roles)
+            raise InputError(f"the recording has no {name!r}{hint}; roles: {known}")
+        return self[roles[name]]
 
     def __repr__(self) -> str:
         clocks = ", ".join(repr(clock) for clock in self.clocks.values())
@@ -178,8 +184,18 @@ class Recording(ChannelSet):
 
     def window(self, start: float = -np.inf, stop: float = np.inf) -> "Recording":
         """Return the part with start <= time <= stop (s), on every clock, sharing the values."""
-        channels, clocks = cut(self.channels, self.clocks.values(), start, stop)
-        return self._with(channels, clocks)
+        parts: dict[str, tuple[Clock, slice]] = {}
+        for clock in self.clocks.values():
+            first = int(np.searchsorted(clock.time, start, "left"))
+            last = max(first, int(np.searchsorted(clock.time, stop, "right")))
+            gaps = [gap - first for gap in clock.gaps if first <= gap < last - 1]
+            part = slice(first, last)
+            parts[clock.name] = Clock(clock.name, clock.time[part], clock.rate, gaps), part
+        channels = []
+        for c in self.channels:
+            base, part = parts[c.clock.name]
+            channels.append(Channel(c.name, c.unit, c.values[part], base, c.text))
+        return self._with(channels, [clock for clock, _ in parts.values()])
 
     def joined(self, other: "Recording") -> "Recording":
         """Return a recording with the channels and clocks of both; meta of `other` wins.
@@ -217,126 +233,11 @@ class Recording(ChannelSet):
             and all(self[name].equals(other[name]) for name in self.names)
         )
 
-    def to_pandas(self, clock: str | None = None, *, units: bool = False) -> "pd.DataFrame":
-        """Return one clock's channels as a table indexed by time (s); units in ``attrs``.
-
-        With `units` they also stand in the columns' names: ``output_position [rad]``.
-        """
-        from elevon.recording.convert import to_pandas
-
-        return to_pandas(self, clock, units=units)
-
-    def to_xarray(self) -> "xr.Dataset":
-        """Return all channels as a dataset, one time dimension a clock, units as attributes.
-
-        The dimension is ``time`` for a single clock, ``time_NAME`` for each of several.
-        """
-        from elevon.recording.convert import to_xarray
-
-        return to_xarray(self)
-
-    def to_arrow(self, clock: str | None = None) -> "pa.Table":
-        """Return one clock's time and channels as an Arrow table, units in the field metadata."""
-        from elevon.recording.convert import to_arrow
-
-        return to_arrow(self, clock)
-
-    def plot(
-        self,
-        names: Iterable[str] | None = None,
-        path: str | os.PathLike[str] | None = None,
-        *,
-        units: Mapping[str, str] | None = None,
-        title: str | None = None,
-        compare: "Recording | str | os.PathLike[str] | None" = None,
-        spectra: bool = False,
-        force: bool = False,
-    ) -> "Figure | Path":
-        """Plot a run: command against output, error, current, speed, faults and states marked.
-
-        With names, or where nothing says what is what: one panel for each unit and clock.
-
-        Parameters
-        ----------
-        names : iterable of str, optional
-            Channels; by default what shows how the run went, by the roles of the channels.
-        path : path, optional
-            ``.png``, ``.svg`` or ``.pdf`` for a picture, ``.html`` for one self-contained
-            interactive page. Without it the matplotlib figure is returned and nothing written.
-        units : mapping of str to str, optional
-            Channel name to the unit displayed; default degrees, rpm and degC for angles, angular
-            speeds and temperatures, else SI.
-        title : str, optional
-            Title; default the actuator's name.
-        compare : Recording or path, optional
-            Another run, drawn over this one: healthy beside faulty.
-        spectra : bool
-            Add the amplitude spectra of error, current and speed.
-        force : bool
-            Whether an existing file may be replaced.
-
-        Returns
-        -------
-        Figure or Path
-            The figure, or the file written.
-
-        Raises
-        ------
-        UnknownNameError
-            Unknown channel or file ending.
-        OutputError
-            The file exists already or cannot be written.
-        """
-        from elevon.recording.plot import plot
-
-        names = None if names is None else list(names)
-        return plot(
-            self,
-            names,
-            path,
-            units=units or {},
-            title=title,
-            compare=None if compare is None else self._other(compare),
-            with_spectra=spectra,
-            force=force,
-        )
-
-    @staticmethod
-    def _other(given: "Recording | str | os.PathLike[str]") -> "tuple[str, Recording]":
-        """Return another recording and what it is called in a legend."""
-        if isinstance(given, Recording):
-            return str(given.meta.get("label") or "other"), given
-        return Path(given).name, Recording.load(given)
-
-    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
-        """Write the recording to a file, whole or not at all.
-
-        Parameters
-        ----------
-        path : path
-            The ending chooses the format: ``.parquet``, ``.nc``, ``.mat`` (version 5, at most
-            2 GB), ``.csv`` (a plain table with ``NAME.csv.json`` beside it; several clocks: one
-            table ``NAME.CLOCK.csv`` each). All give back every bit on load.
-        force : bool
-            Whether an existing file may be replaced.
-
-        Returns
-        -------
-        Path
-            The file written.
-
-        Raises
-        ------
-        UnknownNameError
-            Another ending.
-        InputError
-            Something this format cannot hold.
-        OutputError
-            The file exists already or cannot be written.
-        """
-        from elevon.recording.formats import save
-
-        return save(self, path, force=force)
+    to_pandas = to_pandas
+    to_xarray = to_xarray
+    to_arrow = to_arrow
+    plot = plot
+    save = save
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, max_bytes: int = MAX_BYTES) -> "Recording":
@@ -356,9 +257,6 @@ class Recording(ChannelSet):
         InputError
             No such file, or an ending that is not a format.
         """
-        from elevon.recording.formats import load
-        from elevon.recording.old import warn_of_old_names
-
         loaded = dict(vars(load(path, max_bytes=max_bytes)))
         if old := loaded.pop("old"):
             warn_of_old_names(path, old, 2)
