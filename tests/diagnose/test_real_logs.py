@@ -41,7 +41,7 @@ def test_a_healthy_screw_of_another_make_is_never_given_a_cause(shared):
             seen.setdefault(len(base), Counter())[answer.status] += 1
             assert not answer.best
     print(seen)  # noqa: T201 - the counts are what it is for
-    assert set(seen[1]) <= {"healthy", "model_does_not_fit", "refused"}
+    assert set(seen[0]) | set(seen[1]) <= {"healthy", "model_does_not_fit", "refused"}
 
 
 def test_real_classes_are_learnt_and_judged_by_runs_and_loads_left_out(shared):

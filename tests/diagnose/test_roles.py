@@ -73,6 +73,24 @@ def test_what_no_candidate_moves_is_seen_by_roles_too(screw, gear):
     assert not {"current_mean", "creeping_current"} & set(names)
 
 
+def test_what_nobody_ever_saw_healthy_has_no_unknown_fault(screw, tmp_path):
+    """A file that no logs were calibrated to may be another unit's; a calibrated one is not."""
+    path = tmp_path / "unit.toml"
+    value = screw.parameters.value("motor.inertia")
+    path.write_text(
+        f'name = "unit"\nbase = "nasa-ballscrew"\n[motor.inertia]\nvalue = {value!r}\n'
+        'unit = "kg m2"\nsource = "logs"\nconfidence = "calibrated"\n'
+    )
+    item = log(screw, day=2)
+    hum = item.with_channels(torque_current=item.current + 20.0 * np.sin(400.0 * item.time))
+    few = ["backlash@transmission"]
+    odd = [replace(hum, recording=None)]
+    answers = [diagnose(odd, unit, faults=few) for unit in (screw, Actuator.load(path))]
+    assert [a.status for a in answers] == ["model_does_not_fit", "unknown_fault"]
+    assert any("give a baseline, or calibrate" in text for text in answers[0].findings)
+    assert (answers[0].alarm, answers[0].best, answers[0].hypotheses) == (False, (), ())
+
+
 def test_two_faults_of_a_screw_are_named_together(screw):
     few = ["backlash@transmission", "gain_drift@control.position", "short@motor.phase_a"]
     base = [log(screw, day=1, name="base")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +22,15 @@ from elevon.diagnose.engine.spread import LearnedSpread
 from elevon.diagnose.engine.table import FeatureVector
 from elevon.experiment import Variant
 
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+
 Faults = Sequence[tuple[CandidateFault, float]]
 
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _FEWER = 5000  # draws that show such a chance
+_LOW = "low."  # parameters that `elevon fit-low` fits to the switching model
 _SHARE = 3.0  # a unit's value over the model's, either way, that a shift is scaled by at most
 #: Deviations that a fault moves the features by at least where its direction counts: what one
 #: direction alone needs at 5 % of false alarms; a smaller fault is not called by itself.
@@ -84,6 +89,11 @@ class LogCase:
         """Model error of each number's shift on its own, as a share, shape (k,)."""
         return np.array([self.model.table[name].error for name in self.unit.names])
 
+    @property
+    def unit_known(self) -> bool:
+        """Whether a healthy log of this unit was seen: a baseline, or one it is calibrated to."""
+        return self.unit.baselines > 0 or self.item is None or calibrated(self.item.actuator)
+
     def shift(self, key: str, severity: Floats) -> Floats:
         """Return what severities, shape (m,), do to this unit's features, shape (m, k)."""
         at, sizes, level, factor = self._unit_ways
@@ -107,6 +117,12 @@ class LogCase:
     def uncertainty(self, key: str, severity: float) -> Floats:
         """Return the deviation that a severity gives this unit's features, shape (k,)."""
         return self.model.uncertainty(key, severity)[self.model.places(self.unit.names)]
+
+
+def calibrated(actuator: Actuator) -> bool:
+    """Whether an actuator's numbers stand on logs; those of its reduced-order model need none."""
+    known = actuator.parameters
+    return any(known[p].confidence == "calibrated" and not p.startswith(_LOW) for p in known)
 
 
 def case_of(

@@ -40,6 +40,10 @@ _ALL = 128  # pairs of faults that are all scored; of more the most promising of
 _MOST = 16
 _WORTH = 0.01  # probability from which on a set of faults is worth a run
 _UNKNOWN = 0.5  # probability of no candidate from which on none is named
+NEVER_SEEN = (
+    "no healthy log of this unit is known, neither a baseline nor a calibration: give a baseline, "
+    "or calibrate (elevon calibrate)"
+)
 MISFIT: Literal["model_does_not_fit"] = "model_does_not_fit"
 Status = Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit"]
 
@@ -146,7 +150,9 @@ def _status(
 ) -> tuple[Status, Reason | None, tuple[str, ...]]:
     """Return the verdict, why no cause is named, and the findings on what named faults leave.
 
-    What is named explains the logs better than anything else, and no feature refutes it.
+    What is named explains the logs better than anything else, and no feature refutes it. What no
+    candidate explains is a fault only where this unit's healthy state is known; else the actuator
+    file is as likely to be another unit's.
     """
     misfit = next((case.misfit for case in cases if case.misfit is not None), None)
     if misfit is not None:
@@ -155,13 +161,16 @@ def _status(
         return "healthy", None, unexplained(cases, named)
     if not named or result.other >= _UNKNOWN:
         text = f"{NO_CANDIDATE} (probability {result.other:.2g})"
-        return "unknown_fault", farthest(cases[_worst(cases)]), (text,)
-    against = refuting(cases, named)
-    if against is not None:
+        against = farthest(cases[_worst(cases)])
+    else:
+        against = refuting(cases, named)
+        if against is None:
+            return "faulty", None, unexplained(cases, named)
         names = " and ".join(c.key for c, _ in named)
         text = f"the most probable cause, {names}, is refuted by {against.feature}"
-        return "unknown_fault", against, (text,)
-    return "faulty", None, unexplained(cases, named)
+    if not any(case.unit_known for case in cases):
+        return MISFIT, against, (text, NEVER_SEEN)
+    return "unknown_fault", against, (text,)
 
 
 def _worst(cases: Sequence[LogCase]) -> int:
