@@ -242,6 +242,32 @@ def test_numbers_of_a_closed_form():
     ] == pytest.approx(0.0, abs=2e-3)
 
 
+def test_a_number_states_the_deviation_that_noise_and_a_slope_s_misfit_give_it():
+    """Sixty logs of one motion, another noise in each; and a current that hardly moves."""
+    rng, time = np.random.default_rng(3), np.arange(0.0, 8.0, 0.01)
+    speed = 20.0 + 10.0 * np.sin(2.0 * time)
+    units = {"torque_voltage": "V", "torque_current": "A", "motor_speed": "rad/s"}
+
+    def read(current, bend=0.0, noise=0.0):
+        voltage = 0.9 * current + 1.1 * speed + bend * speed**2 * np.sin(0.7 * time)
+        channels = {"torque_voltage": voltage, "torque_current": current, "motor_speed": speed}
+        seen = {r: x + noise * rng.standard_normal(len(x)) for r, x in channels.items()}
+        units["command"] = "1"
+        return numbers_of(seen, np.zeros(len(time)), time, units, None, noisy=True)
+
+    lively = 3.0 * np.cos(5.0 * time)
+    logs = [read(lively, noise=0.1) for _ in range(60)]
+    for name in ("torque_current: last", "torque_current: mean of part 6", "motor_speed: rms",
+                 "torque_voltage: by current"):  # fmt: skip
+        stated = np.median([x.noise[name] for x in logs])
+        scatter = np.std([x.values[name] for x in logs], ddof=1)
+        assert stated == pytest.approx(scatter, rel=0.3), name
+    name = "torque_voltage: by current"
+    still = read(0.01 * lively, bend=0.002)
+    assert abs(still.values[name] - 0.9) < 3.0 * still.noise[name]
+    assert read(lively, bend=0.002).noise[name] < 0.05 * still.noise[name]
+
+
 def test_spread_keeps_what_is_linear_and_gives_each_number_its_rest():
     rng = np.random.default_rng(0)
     steps = np.linalg.qr(rng.standard_normal((400, 3)))[0] * 20.0  # unit covariance

@@ -61,14 +61,15 @@ class WindowReading(RoleReading):
         """Instants of the window [s]."""
         return self.log.time[self.log.time >= self.first - 1e-9]
 
-    def _numbers(self, channels: Mapping[str, Floats]) -> Numbers:
+    def _numbers(self, channels: Mapping[str, Floats], *, noisy: bool = False) -> Numbers:
         count = len(self.inside)
         if count == len(self.log.time):
-            return super()._numbers(channels)
+            return super()._numbers(channels, noisy=noisy)
         part = replace(
             self, log=self.log.part(self.log.time >= self.first - 1e-9, 0.0, self.seconds)
         )
-        return part._numbers({role: values[-count:] for role, values in channels.items()})
+        tail = {role: values[-count:] for role, values in channels.items()}
+        return part._numbers(tail, noisy=noisy)
 
     def digest(self) -> bytes:
         """Of all in the log that its model runs depend on."""

@@ -15,19 +15,18 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.table import Feature, FeatureTable
+from elevon.diagnose.roles.catalogue import catalogue_values
+from elevon.diagnose.roles.series import noise_deviation
+from elevon.diagnose.roles.slopes import Slope, slopes
 
 _SLOW = 100.0  # Hz of the means that levels and regressions are made of
 _PARTS = 6  # of a motion one way: what happens when
 _BOTH = 0.1  # share of the time in each direction from which on a motion goes both ways
 _MOVING = 0.2  # of the speed's size (95 %)
-_APART = 0.4  # of a regressor that those before it do not make up
 _FULL = 0.95  # of the largest set point: above it a loop is at its limit
 _FEW = 24  # changes of a state whose instants count; more come from a fault
 _DIGITAL = ("state", "switch", "hall", "brake_released", "locked", "fault_code")
 _TEMPERATURES = ("temperature", "surface_temperature", "nut_temperature", "drive_temperature")
-_FEATURES = ("level", "friction", "transmission", "orders", "bands")
-#: What levels here say already, and what a single moment decides.
-_LEFT_OUT = ("mean", "kurtosis", "peak", "moving")
 _TRAVEL = 0.02  # of the position's RMS: size of a lost motion where there is none
 
 
@@ -43,23 +42,26 @@ class _Kind(NamedTuple):
         switching model: what compliance and current loops do, the reduced-order model lacks.
     least : float
         Of its channel's size, the least size: below it nothing repeats.
+    misfit : float
+        Of a slope's deviation by its residual, the part that differs from log to log.
     """
 
     share: float
     absolute: float = 0.0
     mismatch: float = 10.0
     least: float = 0.0
+    misfit: float = 0.0
 
 
 #: Least deviations, beside what drawn days of the model show: counts, clocks, what the model has
 #: not: amplifiers and sensors of ordinary class, filters, a control unit's millisecond.
 _KINDS: Mapping[str, _Kind] = {
     "level": _Kind(0.01, least=0.1),
-    "slope": _Kind(0.01, mismatch=30.0, least=0.1),
+    "slope": _Kind(0.01, mismatch=30.0, least=0.1, misfit=1.0),
     "gain": _Kind(0.01),
     "offset": _Kind(0.02, mismatch=50.0, least=0.5),
     "small": _Kind(0.02, mismatch=100.0, least=0.1),
-    "ripple": _Kind(0.05, mismatch=60.0, least=0.04),
+    "ripple": _Kind(0.05, mismatch=60.0, least=0.04, misfit=1.0),
     "band": _Kind(0.10, mismatch=30.0, least=0.02),
     "instant": _Kind(0.005, 0.01),
     "count": _Kind(0.0, 0.25, mismatch=3.0),
@@ -84,20 +86,32 @@ class Numbers:
         Name to the size of what it is measured in: a channel's RMS, a slope's own part of it.
     units : mapping of str to str
         Name to unit.
+    noise : mapping of str to float
+        Name to its deviation by what is in this log alone: noise, a slope's misfit.
     """
 
     values: dict[str, float]
     kinds: dict[str, str]
     sizes: dict[str, float]
     units: dict[str, str]
+    noise: dict[str, float]
 
-    def add(self, name: str, value: float, kind: str, size: float = 0.0, unit: str = "") -> None:
+    def add(
+        self, name: str, value: float, kind: str, *, size: float = 0.0, unit: str = "",
+        noise: float = 0.0,
+    ) -> None:  # fmt: skip
         """Keep a number that is finite."""
         if np.isfinite(value):
+            self.noise[name] = float(noise)
             self.values[name] = float(value)
             self.kinds[name] = kind
             self.sizes[name] = float(size)
             self.units[name] = unit
+
+    def add_slope(self, name: str, slope: Slope, kind: str, share: float, unit: str) -> None:
+        """Keep a slope, of a size that is a share of its own part."""
+        noise = float(np.hypot(slope.noise, _KINDS[kind].misfit * slope.misfit))
+        self.add(name, slope.value, kind, size=share * slope.size, unit=unit, noise=noise)
 
     def table(self) -> FeatureTable:
         """Return the records of the numbers."""
@@ -113,7 +127,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class _Slow:
-    """Means of a log over hundredths of a second."""
+    """Means of a log over hundredths of a second; `noise` is that of the channels as logged."""
 
     time: Floats
     channels: Mapping[str, Floats]
@@ -121,23 +135,28 @@ class _Slow:
     speed: Floats | None
     forward: npt.NDArray[np.bool_]
     backward: npt.NDArray[np.bool_]
-
+    units: Mapping[str, str]
+    noise: Mapping[str, float]
     size: float = 1.0
+
+    @property
+    def doubted(self) -> bool:
+        """Whether deviations are wanted."""
+        return bool(self.noise)
 
     @property
     def both(self) -> bool:
         """Whether the motion goes both ways."""
         return bool(min(self.forward.mean(), self.backward.mean()) > _BOTH)
 
-    def mean(self, values: Floats, way: float) -> float:
-        """Return the mean where the motion goes one way.
+    def weights(self, way: float) -> Floats:
+        """Return weights of a mean where the motion goes one way.
 
-        Weights grow with the speed about the threshold, so that no single sample decides.
+        They grow with the speed about the threshold, so that no single sample decides.
         """
         assert self.speed is not None
-        return float(
-            np.average(values, weights=np.clip(way * self.speed / self.size - 0.5, 0.0, 1.0))
-        )
+        weights = np.clip(way * self.speed / self.size - 0.5, 0.0, 1.0)
+        return np.asarray(weights / weights.sum(), dtype=np.float64)
 
 
 def numbers_of(
@@ -146,6 +165,8 @@ def numbers_of(
     time: Floats,
     units: Mapping[str, str],
     pole_pairs: float | None,
+    *,
+    noisy: bool = False,
 ) -> Numbers:
     """Return the numbers of a log, or of a model run on its instants.
 
@@ -159,28 +180,45 @@ def numbers_of(
         Role to unit.
     pole_pairs : float or None
         Of the motor, for orders of the electrical turn.
+    noisy : bool
+        Whether each number's deviation by what is in the log alone is wanted. What of a channel
+        changes from sample to sample counts as its noise; ripple faster than the log's clock is
+        among it, and repeats as little.
     """
-    out = Numbers({}, {}, {}, {})
-    slow = _slowed(channels, command, time, units)
+    out = Numbers({}, {}, {}, {}, {})
+    noise = _noise_of(channels, units) if noisy else {}
+    slow = _slowed(channels, command, time, units, noise)
     analog = [r for r in channels if units[r] != "1" and not r.startswith(_DIGITAL)]
     for role in channels:
         if role in _TEMPERATURES:
-            _rise(out, role, channels[role])
+            _rise(out, role, channels[role], noise.get(role, 0.0))
         elif role in analog:
             if role != "motor_position":  # no log says where its zero is
-                _levels(out, role, slow, units[role])
+                _levels(out, role, slow, len(time) // len(slow.time))
         else:
             _events(out, role, channels[role], time)
     _current(out, slow)
     _voltage(out, slow)
     _loops(out, channels, slow)
     _ratios(out, slow)
-    _features(out, {**channels, "command": command}, time, units, pole_pairs)
+    served = {r: v for r, v in channels.items() if units[r] != "1"}
+    if units["command"] == units.get("output_position"):
+        served["command"] = command
+    _features(out, served, 1.0 / float(time[1] - time[0]), pole_pairs, slow)
     return out
 
 
+def _noise_of(channels: Mapping[str, Floats], units: Mapping[str, str]) -> dict[str, float]:
+    seen = {role: x for role, x in channels.items() if units[role] != "1" and len(x) > 3}
+    return {role: noise_deviation(x) for role, x in seen.items()}
+
+
 def _slowed(
-    channels: Mapping[str, Floats], command: Floats, time: Floats, units: Mapping[str, str]
+    channels: Mapping[str, Floats],
+    command: Floats,
+    time: Floats,
+    units: Mapping[str, str],
+    noise: Mapping[str, float],
 ) -> _Slow:
     step = max(1, round(1.0 / (_SLOW * (time[1] - time[0]))))
     count = len(time) // step * step
@@ -195,29 +233,39 @@ def _slowed(
         speed = np.gradient(channels["output_position"], clock)
     if speed is None:
         none = np.zeros(len(clock), dtype=np.bool_)
-        return _Slow(clock, channels, mean(command), None, none, none)
+        return _Slow(clock, channels, mean(command), None, none, none, units, noise)
     size = _MOVING * float(np.quantile(np.abs(speed), 0.95))
-    return _Slow(clock, channels, mean(command), speed, speed > size, speed < -size, size)
+    ways = (speed > size, speed < -size)
+    return _Slow(clock, channels, mean(command), speed, *ways, units, noise, size)
 
 
-def _levels(out: Numbers, role: str, slow: _Slow, unit: str) -> None:
-    """Means by direction; of a motion one way, by its parts."""
-    values = slow.channels[role]
+def _levels(out: Numbers, role: str, slow: _Slow, step: int) -> None:
+    """Means by direction; of a motion one way, by its parts. Each is of `step` samples."""
+    values, noise = slow.channels[role], slow.noise.get(role, 0.0) / np.sqrt(step)
     size = float(np.sqrt(np.mean(values**2)))
-    out.add(f"{role}: rms", size, "level", size, unit)
+
+    def add(name: str, value: float, count: float) -> None:
+        deviation = noise / np.sqrt(count)
+        out.add(
+            f"{role}: {name}", value, "level", size=size, unit=slow.units[role], noise=deviation
+        )
+
+    add("rms", size, len(values))
     if slow.both:
-        out.add(f"{role}: mean forwards", slow.mean(values, 1.0), "level", size, unit)
-        out.add(f"{role}: mean backwards", slow.mean(values, -1.0), "level", size, unit)
+        for name, way in (("forwards", 1.0), ("backwards", -1.0)):
+            weights = slow.weights(way)
+            add(f"mean {name}", float(weights @ values), 1.0 / float(weights @ weights))
     else:
         for k, part in enumerate(np.array_split(values, _PARTS)):
-            out.add(f"{role}: mean of part {k + 1}", part.mean(), "level", size, unit)
-        out.add(f"{role}: last", values[-max(len(values) // 50, 1) :].mean(), "level", size, unit)
+            add(f"mean of part {k + 1}", part.mean(), len(part))
+        last = values[-max(len(values) // 50, 1) :]
+        add("last", last.mean(), len(last))
 
 
-def _rise(out: Numbers, role: str, values: Floats) -> None:
+def _rise(out: Numbers, role: str, values: Floats, noise: float) -> None:
     part = max(len(values) // 50, 1)
     rise = values[-part:].mean() - values[:part].mean()
-    out.add(f"{role}: rise", float(rise), "rise", 0.0, "K")
+    out.add(f"{role}: rise", float(rise), "rise", unit="K", noise=noise * np.sqrt(2.0 / part))
 
 
 def _events(out: Numbers, role: str, values: Floats, time: Floats) -> None:
@@ -228,30 +276,7 @@ def _events(out: Numbers, role: str, values: Floats, time: Floats) -> None:
     if len(turns) > _FEW:
         out.add(f"{role}: mean", float(np.mean(values)), "end")
     last = float(time[turns[-1]] if len(turns) else time[-1])
-    out.add(f"{role}: last change", last, "instant", 0.0, "s")
-
-
-def _fit(y: Floats, columns: Mapping[str, Floats]) -> dict[str, tuple[float, float]]:
-    """Slopes by least squares; each with the size of its own part of y.
-
-    Columns count in their order: one that those before it nearly make up is left out, since its
-    slope would be chance.
-    """
-    names: list[str] = []
-    basis: list[Floats] = []
-    for name, x in columns.items():
-        residual = x - sum((q * float(q @ x) for q in basis), np.zeros(len(x)))
-        size = float(np.linalg.norm(residual))
-        if size > _APART * float(np.linalg.norm(x)):
-            names.append(name)
-            basis.append(residual / size)
-    if not names or len(y) < 4 * (len(names) + 1):
-        return {}
-    design = np.column_stack([columns[n] for n in names])
-    norms = np.sqrt(np.mean(design**2, axis=0))
-    slopes = np.linalg.lstsq(design / norms, y, rcond=None)[0] / norms
-    part = float(np.sqrt(np.mean(y**2))) / norms
-    return {n: (float(s), float(p)) for n, s, p in zip(names, slopes, part, strict=True)}
+    out.add(f"{role}: last change", last, "instant", unit="s")
 
 
 def _current(out: Numbers, slow: _Slow) -> None:
@@ -265,11 +290,11 @@ def _current(out: Numbers, slow: _Slow) -> None:
         "acceleration": np.gradient(slow.speed, slow.time),
         "speed": slow.speed,
     }
-    for name, (value, size) in _fit(
-        slow.channels["torque_current"][moving], {n: x[moving] for n, x in columns.items()}
-    ).items():
+    current = slow.channels["torque_current"][moving]
+    columns = {n: x[moving] for n, x in columns.items()}
+    for name, slope in slopes(current, columns, doubted=slow.doubted).items():
         kind = "offset" if name == "constant" else "slope"
-        out.add(f"torque_current: by {name}", value, kind, size, "A")
+        out.add_slope(f"torque_current: by {name}", slope, kind, 1.0, "A")
 
 
 def _voltage(out: Numbers, slow: _Slow) -> None:
@@ -278,12 +303,14 @@ def _voltage(out: Numbers, slow: _Slow) -> None:
     moving = slow.forward | slow.backward
     if slow.speed is not None and {"torque_voltage", "torque_current"} <= channels.keys():
         columns = {"speed": slow.speed[moving], "current": channels["torque_current"][moving]}
-        for name, (value, size) in _fit(channels["torque_voltage"][moving], columns).items():
-            out.add(f"torque_voltage: by {name}", value, "slope", 0.2 * size, "V")
+        voltage = channels["torque_voltage"][moving]
+        for name, slope in slopes(voltage, columns, doubted=slow.doubted).items():
+            out.add_slope(f"torque_voltage: by {name}", slope, "slope", 0.2, "V")
     if {"supply_voltage", "supply_current"} <= channels.keys():
         columns = {"constant": np.ones(len(slow.time)), "current": channels["supply_current"]}
-        for name, (value, size) in _fit(channels["supply_voltage"], columns).items():
-            out.add(f"supply_voltage: by {name}", value, "gain", 0.02 * size, "V")
+        voltage = channels["supply_voltage"]
+        for name, slope in slopes(voltage, columns, doubted=slow.doubted).items():
+            out.add_slope(f"supply_voltage: by {name}", slope, "gain", 0.02, "V")
 
 
 def _loops(out: Numbers, channels: Mapping[str, Floats], slow: _Slow) -> None:
@@ -295,17 +322,17 @@ def _loops(out: Numbers, channels: Mapping[str, Floats], slow: _Slow) -> None:
         error = slow.command - channels["output_position"]
         # The error by the set point: noise of the position is in the error.
         columns = {"set point": ref[free], "constant": np.ones(int(free.sum()))}
-        for name, (value, size) in _fit(error[free], columns).items():
+        for name, slope in slopes(error[free], columns, doubted=slow.doubted).items():
             kind = "gain" if name == "set point" else "offset"
-            out.add(f"position error: by {name}", value, kind, size, "s")
+            out.add_slope(f"position error: by {name}", slope, kind, 1.0, "s")
     target = "current_ref" if "current_ref" in channels else "torque_current"
     if {"speed_ref", "motor_speed", target} <= channels.keys():
         error = channels["speed_ref"] - channels["motor_speed"]
         columns = {"step": np.diff(error), "error": error[1:]}
-        fitted = _fit(np.diff(channels[target]), columns)
+        fitted = slopes(np.diff(channels[target]), columns, doubted=slow.doubted)
         if "step" in fitted:
-            value, size = fitted["step"]
-            out.add(f"{target}: by step of speed error", value, "ripple", 0.2 * size, "A s/rad")
+            name = f"{target}: by step of speed error"
+            out.add_slope(name, fitted["step"], "ripple", 0.2, "A s/rad")
 
 
 def _ratios(out: Numbers, slow: _Slow) -> None:
@@ -319,49 +346,22 @@ def _ratios(out: Numbers, slow: _Slow) -> None:
         y = channels[one] if one == "motor_speed" else np.gradient(channels[one], slow.time)
         x = np.gradient(channels[other], slow.time)
         if np.ptp(x[moving]) > 0.0:
-            value, size = _fit(y[moving], {"rate": x[moving]}).get("rate", (np.nan, 0.0))
-            out.add(f"{one}: by {other}", value, "gain", 0.1 * size)
+            fitted = slopes(y[moving], {"rate": x[moving]}, doubted=slow.doubted)
+            for slope in fitted.values():
+                out.add_slope(f"{one}: by {other}", slope, "gain", 0.1, "")
 
 
 def _features(
-    out: Numbers,
-    channels: Mapping[str, Floats],
-    time: Floats,
-    units: Mapping[str, str],
-    pole_pairs: float | None,
+    out: Numbers, served: Mapping[str, Floats], rate: float, pole_pairs: float | None, slow: _Slow
 ) -> None:
     """Features of the catalogue, as far as the roles allow them."""
-    from elevon import _core
-    from elevon.features.plan import core_plan
-    from elevon.features.records import wanted_records
-
-    served = {r: v for r, v in channels.items() if units[r] != "1"}
-    if units["command"] != units.get("output_position"):
-        served.pop("command", None)
-    rate = 1.0 / float(time[1] - time[0])
-    records = wanted_records(["all"], {r: r for r in served}, rate, "features")[0]
-    records = [
-        r
-        for r in records
-        if r.family in _FEATURES
-        and not any(word in r.name.split("_") for word in _LEFT_OUT)
-        and not (r.name.endswith("_rms") and not r.name.startswith("tracking"))
-        and ("electrical" not in r.name or pole_pairs is not None)
-    ]
-    roles = sorted({role for r in records for role in r.roles})
-    if not records:
-        return
-    names = [r.name for r in records]
-    plan = core_plan(names, roles, rate=rate, pole_pairs=pole_pairs or 1.0)
-    values = _core.features(plan, [np.ascontiguousarray(served[role]) for role in roles])
-    for record, value in zip(records, values.tolist(), strict=True):
+    for record, value, noise in catalogue_values(served, rate, pole_pairs, slow.noise):
         kind = {"orders": "ripple", "bands": "band"}.get(record.family, "level")
         kind = "offset" if record.name == "load_current" else kind
         if record.name == "lost_motion" or record.name.startswith("tracking"):
             kind = "small" if kind == "level" else kind
         size = _channel_size(record.name, record.family, served)
-        unit = record.unit_of(dict(units))
-        out.add(record.name, value, kind, size, unit)
+        out.add(record.name, value, kind, size=size, unit=record.unit_of(slow.units), noise=noise)
 
 
 def _channel_size(name: str, family: str, served: Mapping[str, Floats]) -> float:

@@ -17,7 +17,7 @@ from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
 from elevon.diagnose.positions.plausibility import PLAUSIBLE, plausibility_of
 from elevon.diagnose.roles.load import OverStroke, drives_output, load_alike
 from elevon.diagnose.roles.numbers import Numbers, numbers_of
-from elevon.diagnose.roles.series import averaged, noise_deviation, oversampling
+from elevon.diagnose.roles.series import averaged, oversampling
 from elevon.experiment import Experiment, Inputs, Variant, signals_by_role
 from elevon.logs.log import Log, on_clock
 from elevon.parameters.records import wirings
@@ -32,7 +32,6 @@ _SERVES = 0.005  # likewise, up to which faults do the same in both
 _SOONER = 1.3  # times the length of a log's baseline that the log may have
 _ELASTIC = 1.0  # backlash.model: an elastic contact
 _SET_POINT = "_ref"  # end of roles that a drive knows as numbers: nothing filters them
-_AGAIN = 8  # logs with noise added
 _DRAWS = 28
 #: Deviations of the days that are run over those stated: what sets in on a rare day is seen, and
 #: counts in full; what is linear counts as stated.
@@ -111,9 +110,9 @@ class RoleReading(Reading):
 
     @cached_property
     def _read(self) -> tuple[FeatureVector, FeatureTable]:
-        numbers = self._numbers(self.seen)
+        numbers = self._numbers(self.seen, noisy=True)
         values = np.array(list(numbers.values.values()))
-        std = self._noise(numbers.values)
+        std = np.array([numbers.noise[name] for name in numbers.values])
         return FeatureVector(tuple(numbers.values), values, std), numbers.table()
 
     @property
@@ -141,32 +140,10 @@ class RoleReading(Reading):
         runs = self._channels(units)
         return [plausibility_of(self.log.with_channels(**r), self.actuator) for r in runs]
 
-    def _numbers(self, channels: Mapping[str, Floats]) -> Numbers:
-        known = self.actuator.parameters
+    def _numbers(self, channels: Mapping[str, Floats], *, noisy: bool = False) -> Numbers:
+        known, log = self.actuator.parameters, self.log
         pairs = known.value("motor.pole_pairs") if "motor.pole_pairs" in known else None
-        return numbers_of(channels, self.log["command"], self.log.time, self.log.units, pairs)
-
-    def _noise(self, values: Mapping[str, float]) -> Floats:
-        """Each number's deviation by the noise of the log's channels: as much noise again.
-
-        What of a channel changes from sample to sample counts as its noise; ripple faster than the
-        log's clock is among it, and repeats as little.
-        """
-        sizes = {
-            role: noise_deviation(x)
-            for role, x in self.seen.items()
-            if self.log.units[role] != "1" and len(x) > 3
-        }
-        rng = np.random.default_rng(15)
-        rows = []
-        for _ in range(_AGAIN):
-            noisy = {
-                role: x + sizes[role] * rng.standard_normal(len(x)) if role in sizes else x
-                for role, x in self.seen.items()
-            }
-            known = self._numbers(noisy).values
-            rows.append([known.get(name, value) for name, value in values.items()])
-        return np.asarray(np.std(rows, axis=0, ddof=1), dtype=np.float64)
+        return numbers_of(channels, log["command"], log.time, log.units, pairs, noisy=noisy)
 
     def digest(self) -> bytes:
         """Of all in the log that its model runs depend on."""
