@@ -263,9 +263,9 @@ def test_a_number_states_the_deviation_that_noise_and_a_slope_s_misfit_give_it()
         scatter = np.std([x.values[name] for x in logs], ddof=1)
         assert stated == pytest.approx(scatter, rel=0.3), name
     name = "torque_voltage: by current"
-    still = read(0.01 * lively, bend=0.002)
-    assert abs(still.values[name] - 0.9) < 3.0 * still.noise[name]
-    assert read(lively, bend=0.002).noise[name] < 0.05 * still.noise[name]
+    lazy = read(0.01 * lively, bend=0.002)
+    assert abs(lazy.values[name] - 0.9) < 3.0 * lazy.noise[name]
+    assert read(lively, bend=0.002).noise[name] < 0.05 * lazy.noise[name]
 
 
 def test_spread_keeps_what_is_linear_and_gives_each_number_its_rest():
