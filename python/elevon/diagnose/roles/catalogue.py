@@ -73,5 +73,5 @@ def catalogue_values(
         more = [[s * rng.standard_normal(len(columns[0])) for s in sizes] for _ in range(_AGAIN)]
         rows = [read([x + n for x, n in zip(columns, each, strict=True)]) for each in more]
         deviations = np.std(np.where(np.isfinite(rows), rows, values), axis=0, ddof=1)
-    found = zip(records, values.tolist(), deviations.tolist(), strict=True)
-    return [CatalogueValue(*row) for row in found]
+    rows_of = zip(records, values.tolist(), deviations.tolist(), strict=True)
+    return [CatalogueValue(*row) for row in rows_of]
