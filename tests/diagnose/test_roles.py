@@ -11,6 +11,7 @@ from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.candidates import candidates_of, chosen, not_candidates
 from elevon.diagnose.engine.case import case_of
 from elevon.diagnose.engine.days import drawn, factors_of
+from elevon.diagnose.engine.likelihood import _around
 from elevon.diagnose.engine.replay import _RECENT, _severities, spread_of
 from elevon.diagnose.roles.load import load_alike, read_load
 from elevon.diagnose.roles.log import _onset, role_log
@@ -387,6 +388,21 @@ def test_what_is_counted_is_run_at_each_count(screw):
     channel = chosen(["return_jam@screw.return_channel"], screw)[0]
     np.testing.assert_array_equal(_severities(channel, 4, 3), np.arange(channel.high + 1.0))
     assert channel.high >= 2.0
+    fine = _around(1.4, 0.3, channel, 121)
+    np.testing.assert_array_equal(fine, [1.0, 2.0, 3.0, 4.0])  # no fraction is a hypothesis
+
+
+@pytest.mark.long
+def test_two_jammed_channels_are_two_and_no_fraction(screw):
+    test = next(t for t in standard_tests(screw) if t.name == "sine-opposing")
+    jam = "return_jam@screw.return_channel=2"
+    for fidelity in ("low", "high"):
+        base, item = day_logs(screw, test, [Day((), 91), Day((jam,), 92)], fidelity)
+        answer = diagnosed(screw, item, [base])
+        assert answer.best == ("return_jam@screw.return_channel",)
+        assert answer.faults[0].severity == 2.0
+        jams = [f for h in answer.hypotheses for f in h.faults if f.kind == "return_jam"]
+        assert all(f.severity == round(f.severity) for f in jams)
 
 
 def test_an_answer_by_roles_does_not_depend_on_earlier_ones(screw):

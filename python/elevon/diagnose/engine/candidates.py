@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from elevon.arrays import Floats
 from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.not_modelled import not_modelled
 from elevon.errors import InputError, unknown
@@ -73,6 +76,17 @@ class CandidateFault:
     def key(self) -> str:
         """``KIND@PLACE``."""
         return f"{self.kind}@{self.place}"
+
+    @property
+    def counted(self) -> bool:
+        """Whether severities are whole numbers from one on."""
+        return self.whole and not self.switched
+
+    def range(self, count: int) -> Floats:
+        """Return severities over the whole range, so many of them; of what is counted, each."""
+        if self.counted:
+            return np.arange(1.0, self.high + 1.0)
+        return np.linspace(self.low, self.high, count)
 
     def text(self, severity: float) -> str:
         """Return the fault in the grammar of faults."""

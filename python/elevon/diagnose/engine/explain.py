@@ -125,7 +125,7 @@ def causes(
         probability = result.of(c.key)
         if c.key in covered or (probability < LISTED and c.key not in best):
             continue
-        low, middle, high = quantiles(*marginals(result, c.key), (0.05, 0.5, 0.95))
+        low, middle, high = _ends(c, *marginals(result, c.key))
         ambiguous = [o for o in _ambiguous(cases, c, middle, candidates) if o.key not in best]
         covered |= {o.key for o in ambiguous}
         probability = min(probability + sum(result.of(o.key) for o in ambiguous), 1.0)
@@ -134,10 +134,16 @@ def causes(
             n for o in ambiguous for n in (*((o.kind, p) for p in (o.place, *o.same)), *o.ambiguous)
         ]
         places = tuple(FaultPlace(*name) for name in names)
-        if c.whole:  # counted, or there or not
-            low, middle, high = (max(float(round(x)), 1.0) for x in (low, middle, high))
         out.append(Cause(c.kind, c.place, c.unit, probability, middle, (low, high), places))
     return tuple(sorted(out, key=lambda cause: -cause.probability))
+
+
+def _ends(c: CandidateFault, grid: Floats, weight: Floats) -> tuple[float, float, float]:
+    """Ends and middle of a severity's interval of 90 %: low, middle, high."""
+    ends = quantiles(grid, weight, (0.05, 0.5, 0.95))
+    if c.whole:  # counted, or there or not
+        ends = [max(float(round(x)), 1.0) for x in ends]
+    return ends[0], ends[1], ends[2]
 
 
 def _left(
@@ -184,7 +190,7 @@ def explanations(
     for h, p in zip(result.hypotheses, result.probabilities, strict=True):
         if p < POSSIBLE:
             continue
-        ends = [quantiles(g, w, (0.05, 0.5, 0.95)) for g, w in zip(h.grids, h.weights, strict=True)]
+        ends = [_ends(known[k], g, w) for k, g, w in zip(h.keys, h.grids, h.weights, strict=True)]
         faults = (
             SuspectedFault(known[k].kind, known[k].place, middle, known[k].unit, (low, high))
             for k, (low, middle, high) in zip(h.keys, ends, strict=True)
@@ -216,8 +222,9 @@ def _ambiguous(
     for other in candidates:
         if other.key == candidate.key:
             continue
-        grid = np.linspace(other.low, other.high, _POINTS)
-        grid = np.sort(np.concatenate((grid, 0.05 * grid)))
+        grid = other.range(_POINTS)
+        if not other.counted:
+            grid = np.sort(np.concatenate((grid, 0.05 * grid)))
         apart = (shift_of(cases, other.key, grid) - shift) @ root.T
         if float(np.linalg.norm(apart, axis=1).min()) < alike:
             out.append(other)
@@ -260,7 +267,7 @@ def _least_seen(cases: Sequence[LogCase], c: CandidateFault, root: Floats) -> fl
         if not seen.size:
             return None
         k = int(seen[0])
-        least = float(grid[k])
+        least = float(np.ceil(grid[k])) if c.counted else float(grid[k])
         grid = np.linspace(grid[max(k - 1, 0)], least, _FINER + 1)
     return least
 

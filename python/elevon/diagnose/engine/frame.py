@@ -66,7 +66,7 @@ class Frame:
     def line(self, c: CandidateFault) -> tuple[Floats, Floats]:
         """Severities over the whole range, and their whitened shifts."""
         if c.key not in self.lines:
-            grid = np.linspace(c.low, c.high, _COARSE)
+            grid = c.range(_COARSE)
             self.lines[c.key] = (grid, self.raw(c.key, grid))
         grid, raw = self.lines[c.key]
         return grid, raw @ self.root.T

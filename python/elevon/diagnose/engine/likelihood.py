@@ -122,7 +122,7 @@ def _one(local: Frame, c: CandidateFault, at: float, prior: float, rare: float =
     moved = local.shift(c.key, fine)
     log = local.log(local.y - moved, c.error * moved)
     top = float(log.max())
-    mass = np.exp(log - top) * np.gradient(fine) * prior_density(c, fine)
+    mass = np.exp(log - top) * _steps(fine) * prior_density(c, fine)
     total = float(mass.sum())
     evidence = top + float(np.log(total)) + rare
     best = float(fine[int(np.argmax(log))])
@@ -180,7 +180,7 @@ def _two(
     grids = [_around(b, 1.5 * w, c, _PAIR) for b, w, c in zip(at, widths, pair, strict=True)]
     log = _of_both(local, pair, local.shift(first.key, grids[0]), local.shift(second.key, grids[1]))
     top = float(log.max())
-    sides = [np.gradient(g) * prior_density(c, g) for g, c in zip(grids, pair, strict=True)]
+    sides = [_steps(g) * prior_density(c, g) for g, c in zip(grids, pair, strict=True)]
     mass = np.exp(log - top) * np.outer(*sides)
     total = float(mass.sum())
     peak = np.unravel_index(int(np.argmax(log)), log.shape)
@@ -224,10 +224,15 @@ def prior_density(c: CandidateFault, severity: Floats) -> Floats:
 
 
 def _around(best: float, scale: float, c: CandidateFault, count: int) -> Floats:
-    if c.switched:  # its likelihood is a step, which no width describes
-        return np.linspace(c.low, c.high, count)
+    if c.whole:  # counts; of what is there or not the likelihood is a step without a width
+        return c.range(count)
     low, high = max(c.low, best - _REACH * scale), min(c.high, best + _REACH * scale)
     return np.linspace(low, high, count)
+
+
+def _steps(grid: Floats) -> Floats:
+    """Width of each severity's part of a grid; a single count has one."""
+    return np.gradient(grid) if len(grid) > 1 else np.ones(1)
 
 
 def _of_both(
