@@ -19,12 +19,12 @@ def unit():
     return Actuator.load("torino-rotary")
 
 
-def log(*, error=None, lost=0.0, scale=1.0, leak=None, drag=0.0, **channels):
+def log(*, error=None, lost=0.0, scale=1.0, leak=None, drag=0.0, stroke=220.0, **channels):
     """A servo's log of 20 s at 400 Hz: friction, counts and what is asked for, and one fault."""
     rng = np.random.default_rng(1)
     time = np.arange(8001) / 400.0
     turn = 0.1 * math.pi * time
-    shaft, speed = 110.0 * (1.0 - np.cos(turn)), 11.0 * math.pi * np.sin(turn)
+    shaft, speed = 0.5 * stroke * (1.0 - np.cos(turn)), 0.05 * stroke * math.pi * np.sin(turn)
     output = (shaft - 0.4 * np.sign(speed)) / RATIO
     way = np.sign(speed)
     current = 1.2 * way + 0.004 * speed + drag * way * (1.0 + np.cos(0.381 * shaft + 0.7))
@@ -88,6 +88,7 @@ def test_a_cage_rubs_once_a_turn_of_its_own(unit):
     assert (cause.kind, cause.place) == ("bearing", "bearing.cage")
     whole = 2.0 * 0.05 * unit.parameters.value("control.torque_constant")
     assert cause.interval[0] < whole < cause.interval[1]
+    assert named(unit, log(drag=0.05, stroke=15.0)) is None  # less than a turn of it
 
 
 def test_nothing_flows_although_all_is_asked_for(unit):

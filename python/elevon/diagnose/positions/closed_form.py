@@ -39,6 +39,9 @@ PURE = 0.3
 """Of the larger order: below it the other one is not there."""
 CAGE = 0.02
 """Amplitude of the friction that turns with the bearing's cage, over the current's RMS."""
+TURNS = 1.5
+"""Turns of the cage in a log's travel: of less, its friction looks like one that follows the
+stroke, or like a slow drift."""
 LOST = 0.002
 """Least share of lost counts that is told: twice what a gear's ratio may seem off by."""
 FORM = 0.02
@@ -319,6 +322,8 @@ def _cage(item: DriveLog) -> Cause | None:
     rate = np.gradient(np.convolve(speed, np.ones(half) / half, "same"), log.time)
     way = np.sign(speed)
     turn = order * log["motor_position"]
+    if float(np.ptp(turn[moving])) < 2.0 * np.pi * TURNS:
+        return None
     columns = [way * np.cos(turn), way * np.sin(turn), way, way * log.time, speed, rate,
                np.ones_like(speed)]  # fmt: skip
     weights, covariance = regress([column[moving] for column in columns], current[moving])
