@@ -1,6 +1,7 @@
 """What holds for every actuator, whatever its logs are read by."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,11 +21,14 @@ FEW = {
 
 
 CHEAPEST = "torino-rotary"
+EXAMPLE = str(Path(__file__).parents[2] / "examples" / "linear-drive" / "drive.toml")
 
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param(n, marks=[] if n == CHEAPEST else pytest.mark.long) for n in TESTED],
+    params=[
+        pytest.param(n, marks=[] if n == CHEAPEST else pytest.mark.long) for n in [*TESTED, EXAMPLE]
+    ],
 )
 def case(request):
     """An actuator, few candidates, and three healthy days of half of its first test."""
@@ -103,8 +107,6 @@ def test_swapped_positions_are_refused(case):
 def test_a_swapped_speed_and_current_are_refused(case):
     actuator, few, logs = case
     log, role = logs[0], current(logs[0])
-    if not log.has("motor_position", "motor_speed"):
-        pytest.skip("its logs have no position and speed of the motor")
     size = 0.01 * float(np.ptp(log["motor_speed"]))  # as small as a current may be
     swapped = changed(log, "motor_speed", log[role] * size)
     swapped = changed(swapped, role, log["motor_speed"] * 0.01)

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 _CURRENTS = ("torque_current", "current_ref", "supply_current")
 _MISSING, _CLIPPED = 0.01, 0.05  # share of the samples
 _TURN = 0.02  # s over which a position's change is held against a speed
-_ALIKE, _UNLIKE = 0.95, 0.9  # correlation: the same signal; another one, as a current may be
+_ALIKE = 0.95  # correlation of the same signal
+_NEARER = 3.0  # times what a speed lacks of full correlation: another one is that speed
 _PAIRS = 20_000  # samples that are held against each other, about
 _APART = 10.0  # times the stated ratio of two positions, either way: beyond any sensor's gain
 
@@ -56,20 +57,22 @@ def check_sizes(log: Log, actuator: Actuator) -> None:
 
 def _check_speed(log: Log) -> None:
     """Refuse a log whose motor speed is none, where a current is how its position changes."""
-    if not log.has("motor_position", "motor_speed") or log.time[-1] - log.time[0] <= 2.0 * _TURN:
+    place = next((r for r in ("motor_position", "output_position") if log.has(r)), None)
+    if place is None or not log.has("motor_speed") or log.time[-1] - log.time[0] <= 2.0 * _TURN:
         return
     half = max(round(0.5 * _TURN / float(np.median(np.diff(log.time)))), 1)
     step = max(len(log.time) // _PAIRS, 1)
     at = np.arange(half, len(log.time) - half, step)
-    rate = log["motor_position"][at + half] - log["motor_position"][at - half]
+    rate = log[place][at + half] - log[place][at - half]
     alike = _correlation(rate, log["motor_speed"][at])
-    if alike > _UNLIKE or not alike:  # one that stands still is a fault for diagnosis
+    if not alike:  # one that stands still is a fault for diagnosis
         return
+    # A current that drives friction alone goes nearly as the speed does.
+    least = max(_ALIKE, 1.0 - (1.0 - alike) / _NEARER)
     for role in _CURRENTS:
-        if log.has(role) and _correlation(rate, log[role][at]) > _ALIKE:
+        if log.has(role) and _correlation(rate, log[role][at]) > least:
             raise InputError(
-                f"{log.name}: motor_position changes as {role} goes, not as motor_speed: "
-                "swapped columns"
+                f"{log.name}: {place} changes as {role} goes, not as motor_speed: swapped columns"
             )
 
 
