@@ -146,8 +146,6 @@ def brake_loop(
     terms: Sequence[Term],
     duration: float,
     rng: np.random.Generator,
-    *,
-    converter: Hx711 | None = None,
 ) -> BrakeRun:
     """Run the torque loop at the load cell's rate.
 
@@ -163,15 +161,13 @@ def brake_loop(
         Seconds of the load cell's clock, from the trigger.
     rng : Generator
         For the cell's noise.
-    converter : Hx711, optional
-        The cell's converter, and its rate.
 
     Raises
     ------
     RangeError
         A set point below zero or above what the brake can hold.
     """
-    converter = converter or Hx711()
+    converter = Hx711()
     time = np.arange(int(duration * converter.rate) + 1) / converter.rate
     target = set_point(terms, time)
     if target.min(initial=0.0) < 0.0 or target.max(initial=0.0) > rig.limit:

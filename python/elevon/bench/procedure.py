@@ -15,11 +15,10 @@ from typing import Any, Self
 
 from pydantic import (
     StrictStr,
-    field_validator,
     model_validator,
 )
 
-from elevon.bench.steps import Step, TraceStep, plain_name
+from elevon.bench.steps import PlainName, Step, TraceStep
 from elevon.documents import read_toml, validated
 from elevon.errors import unknown
 from elevon.strict import Strict
@@ -38,15 +37,10 @@ class Procedure(Strict):
         In order; at least one of them a trace, each trace with a name of its own.
     """
 
-    name: StrictStr
+    name: PlainName
     text: StrictStr = ""
     stand: StrictStr | None = None
     step: tuple[Step, ...]
-
-    @field_validator("name")
-    @classmethod
-    def _plain(cls, value: str) -> str:
-        return plain_name(value)
 
     @model_validator(mode="after")
     def _traced(self) -> Self:

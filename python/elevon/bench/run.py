@@ -127,10 +127,8 @@ def claim_bench(
     actuator: Actuator,
     out: str | Path,
     *,
-    faults: Sequence[Fault | str] = (),
     seed: int = 0,
     fidelity: str = "high",
-    layout: DriveFormat | None = None,
     force: bool = False,
 ) -> None:
     """Make a folder a procedure's own before it is run; arguments and errors as `run_procedure`.
@@ -138,9 +136,8 @@ def claim_bench(
     With `force` whatever logs are there count as absent from then on: `run_procedure` without
     `force` makes them anew. Without it, finished logs of the very same work keep counting.
     """
-    layout = layout or _layout(actuator)
-    logs_asked = stand_setups(procedure, actuator, faults=faults, seed=seed)
-    _claim(procedure, Path(out).expanduser(), logs_asked, fidelity, layout, force=force)
+    logs, layout = stand_setups(procedure, actuator, seed=seed), _layout(actuator)
+    _claim(procedure, Path(out).expanduser(), logs, fidelity, layout, force=force)
 
 
 def run_procedure(

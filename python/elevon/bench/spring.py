@@ -17,6 +17,7 @@ from elevon.errors import InputError, RangeError
 STANDARD_WIRES: tuple[float, ...] = tuple(
     round(1e-3 * d, 6) for d in packaged_toml("elevon.bench", "wires.toml")["diameters_mm"]
 )
+_COIL_STEP = 1e-3  # m, of the coil diameters tried
 INDEX_RANGE = (4.0, 20.0)  # D / d that can be wound cold (EN 13906-2)
 
 
@@ -182,13 +183,7 @@ def design_spring(
     return SpringDesign(task, wire, coil, max(1, math.ceil(exact - 1e-9)))
 
 
-def search_springs(
-    task: SpringTask | None = None,
-    *,
-    longest: float = 1.1,
-    wires: tuple[float, ...] = STANDARD_WIRES,
-    coil_step: float = 1e-3,
-) -> list[SpringDesign]:
+def search_springs(task: SpringTask | None = None, *, longest: float = 1.1) -> list[SpringDesign]:
     """Return the feasible springs over standard wires, least wire first.
 
     Parameters
@@ -198,10 +193,6 @@ def search_springs(
     longest : float
         Greatest free length [m]: what the tubes under the bench hold. ASSUMED 1.1: the chosen
         spring of 1.026 m fits them.
-    wires : tuple of float
-        Wire diameters tried [m].
-    coil_step : float
-        Step of the coil diameters tried [m].
 
     Returns
     -------
@@ -209,15 +200,14 @@ def search_springs(
         May be empty.
     """
     task = task or SpringTask()
-    for name, value in (("longest", longest), ("coil_step", coil_step)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise RangeError(f"spring: {name} = {value!r} must be above 0")
+    if not (math.isfinite(longest) and longest > 0.0):
+        raise RangeError(f"spring: longest = {longest!r} must be above 0")
     designs = []
-    for wire in wires:
+    for wire in STANDARD_WIRES:
         top = min(task.largest_coil(wire), INDEX_RANGE[1] * wire)
-        first = math.ceil(INDEX_RANGE[0] * wire / coil_step - 1e-9)
-        for k in range(first, math.floor(top / coil_step + 1e-9) + 1):
-            design = design_spring(task, wire=wire, coil=k * coil_step)
+        first = math.ceil(INDEX_RANGE[0] * wire / _COIL_STEP - 1e-9)
+        for k in range(first, math.floor(top / _COIL_STEP + 1e-9) + 1):
+            design = design_spring(task, wire=wire, coil=k * _COIL_STEP)
             if design.feasible and design.free_length <= longest:
                 designs.append(design)
     return sorted(designs, key=lambda design: design.wire_volume)

@@ -8,11 +8,12 @@ import re
 from typing import Annotated, Literal, Self
 
 from pydantic import (
+    AfterValidator,
     Field,
     StrictFloat,
     StrictInt,
     StrictStr,
-    field_validator,
+    ValidationInfo,
     model_validator,
 )
 
@@ -24,15 +25,24 @@ from elevon.units import parse_quantity
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,59}\Z")
 
 
-def _checked(value: Quantity, unit: str, low: float, name: str) -> Quantity:
-    """Return a quantity as given, after its unit and its lower limit have been checked."""
-    try:
-        number = parse_quantity(value, unit, name)
-    except InputError as error:
-        raise ValueError(str(error)) from error
-    if number < low:
-        raise ValueError(f"{name} = {value} is below {low:g} {unit}")
-    return value
+def _least(unit: str, low: float = 0.0) -> AfterValidator:
+    """Return the check of a quantity that has a unit and a least value."""
+
+    def check(value: Quantity, info: ValidationInfo) -> Quantity:
+        try:
+            number = parse_quantity(value, unit, str(info.field_name))
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        if number < low:
+            raise ValueError(f"{info.field_name} = {value}: must be {low:g} {unit} at least")
+        return value
+
+    return AfterValidator(check)
+
+
+Length = Annotated[Quantity, _least("m")]
+Instant = Annotated[Quantity, _least("s")]
+Stiffness = Annotated[Quantity, _least("N/m")]
 
 
 def plain_name(value: str) -> str:
@@ -40,6 +50,9 @@ def plain_name(value: str) -> str:
     if not _NAME.match(value) or value.endswith(("_loadcell", "_command")):
         raise ValueError(f"{value!r} is not a plain file name (letters, digits, '-', '_')")
     return value
+
+
+PlainName = Annotated[StrictStr, AfterValidator(plain_name)]
 
 
 class BacklashStep(Strict):
@@ -119,33 +132,21 @@ class SpringStep(Strict):
 
     kind: Literal["spring"]
     fitted: bool = True
-    stiffness: Quantity = 61.4
-    radius: Quantity = 0.080
-    extension: Quantity = 0.10
-    mover: Quantity = 0.0
-
-    @field_validator("stiffness")
-    @classmethod
-    def _stiffness(cls, value: Quantity) -> Quantity:
-        return _checked(value, "N/m", 0.0, "stiffness")
-
-    @field_validator("radius", "extension", "mover")
-    @classmethod
-    def _length(cls, value: Quantity) -> Quantity:
-        return _checked(value, "m", 0.0, "length")
+    stiffness: Stiffness = 61.4
+    radius: Length = 0.080
+    extension: Length = 0.10
+    mover: Length = 0.0
 
 
 class Drop(Strict):
     """One mass hung on each cable from a time to another, counted from the trigger."""
 
-    mass: Quantity
-    at: Quantity
+    mass: Annotated[Quantity, _least("kg")]
+    at: Instant
     until: Quantity
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        _checked(self.mass, "kg", 0.0, "mass")
-        _checked(self.at, "s", 0.0, "at")
         start, stop = (parse_quantity(x, "s") for x in (self.at, self.until))
         if stop <= start:
             raise ValueError(f"until = {self.until} must be after at = {self.at}")
@@ -197,15 +198,13 @@ class ForceStep(Strict):
 
     kind: Literal["force"]
     terms: tuple[Term, ...] = ()
-    opposing: Quantity = 0.0
-    stiffness: Quantity = 0.0
+    opposing: Annotated[Quantity, _least("N", -math.inf)] = 0.0
+    stiffness: Stiffness = 0.0
     positions: tuple[StrictInt | StrictFloat, ...] = ()
     forces: tuple[StrictInt | StrictFloat, ...] = ()
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
-        _checked(self.opposing, "N", -math.inf, "opposing")
-        _checked(self.stiffness, "N/m", 0.0, "stiffness")
         if len(self.positions) != len(self.forces):
             raise ValueError("'positions' and 'forces' must be of one length")
         if any(b <= a for a, b in itertools.pairwise(self.positions)):
@@ -249,12 +248,7 @@ class SensorStep(Strict):
     gain: StrictInt | StrictFloat = 1.0
     offset: Quantity = 0.0
     fault: Literal["none", "stuck", "dead"] = "none"
-    at: Quantity = 0.0
-
-    @field_validator("at")
-    @classmethod
-    def _later(cls, value: Quantity) -> Quantity:
-        return _checked(value, "s", 0.0, "at")
+    at: Instant = 0.0
 
 
 class TraceStep(Strict):
@@ -275,29 +269,11 @@ class TraceStep(Strict):
     """
 
     kind: Literal["trace"]
-    name: StrictStr
-    duration: Quantity
+    name: PlainName
+    duration: Annotated[Quantity, _least("s", 1.0)]
     command: Command = Command()
-    rate: Quantity | None = None
+    rate: Annotated[Quantity, _least("Hz", 1.0)] | None = None
     initial: dict[str, Quantity] = Field(default_factory=dict)
-
-    @field_validator("rate")
-    @classmethod
-    def _fast(cls, value: Quantity | None) -> Quantity | None:
-        return None if value is None else _checked(value, "Hz", 1.0, "rate")
-
-    @field_validator("name")
-    @classmethod
-    def _plain(cls, value: str) -> str:
-        return plain_name(value)
-
-    @field_validator("duration")
-    @classmethod
-    def _long(cls, value: Quantity) -> Quantity:
-        _checked(value, "s", 0.0, "duration")
-        if parse_quantity(value, "s") < 1.0:
-            raise ValueError(f"duration = {value}: a log lasts 1 s at least")
-        return value
 
 
 _Load = BacklashStep | BrakeStep | SpringStep | WeightsStep | ForceStep | RigStep

@@ -71,8 +71,8 @@ def calibrate(
     table = logs[0] if isinstance(logs, (list, tuple)) and len(logs) == 1 else logs
     if isinstance(table, (str, os.PathLike)) and is_drop_table(Path(table)):
         return run_drops(Path(table), model)
-    request = CalibrationRequest(free, per_log, fidelity, transient, promise)
-    return _refused(way_of(as_logs(logs), model).calibrate(model, request, progress))
+    request = CalibrationRequest(model, free, per_log, fidelity, transient, promise, progress)
+    return _refused(way_of(as_logs(logs), model).calibrate(request))
 
 
 def _refused(result: Calibration) -> Calibration:
@@ -122,4 +122,4 @@ def validate(
     """
     model = as_actuator(actuator)
     way = way_of(as_logs(logs), model, validating=True)
-    return way.validate(model, ValidationRequest(fidelity, transient), progress)
+    return way.validate(ValidationRequest(model, fidelity, transient, progress))

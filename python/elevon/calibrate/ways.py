@@ -26,32 +26,32 @@ _FROM_THE_FIT = "thresholds: from the fit itself, since no log could be held out
 class CalibrationRequest:
     """What is to be estimated; see `elevon.calibrate.door.calibrate`."""
 
+    actuator: Actuator
     free: Sequence[str] | None = None
     per_log: Sequence[str] = ()
     fidelity: str | None = None
     transient: float | None = None
     promise: bool = False
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True)
 class ValidationRequest:
     """How it is to be held against logs; see `elevon.calibrate.door.validate`."""
 
+    actuator: Actuator
     fidelity: str = "low"
     transient: float | None = None
+    progress: Progress | None = None
 
 
 class CalibrationWay(Protocol):
     """Logs of one kind, ready to be calibrated to and validated with."""
 
-    def calibrate(
-        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
-    ) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         """Estimate what the logs determine."""
 
-    def validate(
-        self, actuator: Actuator, request: ValidationRequest, progress: Progress | None
-    ) -> Validation:
+    def validate(self, request: ValidationRequest) -> Validation:
         """Hold an actuator against the logs."""
 
 
@@ -111,20 +111,18 @@ class _Signals:
 
     logs: Sequence[Log]
 
-    def calibrate(
-        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
-    ) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.calibration import calibrate
 
         result = calibrate(
-            self.logs, actuator, free=request.free, per_log=request.per_log,
+            self.logs, request.actuator, free=request.free, per_log=request.per_log,
             fidelity=request.fidelity or "low", transient=request.transient,
-            progress=part(progress, 0.0, 0.8),
+            progress=part(request.progress, 0.0, 0.8),
         )  # fmt: skip
         result = self._compared(result, request.transient)
         if not request.promise or result.validation is None:
             return replace(result, promise=result.validation)
-        return self._held_out(result, request.free, part(progress, 0.85, 1.0))
+        return self._held_out(result, request)
 
     def _compared(self, result: Calibration, transient: float | None) -> Calibration:
         """Old and new values in closed loop on the same logs, where positions were logged."""
@@ -137,27 +135,24 @@ class _Signals:
             return _with(result, f"the closed loop is not compared: {error}")
         return replace(result, validation_before=before, validation=after)
 
-    def _held_out(
-        self, result: Calibration, free: Sequence[str] | None, progress: Progress | None
-    ) -> Calibration:
+    def _held_out(self, result: Calibration, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.promise import held_out_agreement
         from elevon.calibrate.thresholds import outliers
 
         after = result.validation
         assert after is not None
-        agreement = held_out_agreement(self.logs, result.before, free, after, progress)
+        progress = part(request.progress, 0.85, 1.0)
+        agreement = held_out_agreement(self.logs, result.before, request.free, after, progress)
         if agreement is None:
             return _with(replace(result, promise=after), _FROM_THE_FIT)
         apart = "predicted far worse than the other logs; the thresholds leave it out"
         texts = [f"{name}: {apart}" for name in outliers(agreement)]
         return _with(replace(result, promise=agreement), *texts)
 
-    def validate(
-        self, actuator: Actuator, request: ValidationRequest, progress: Progress | None
-    ) -> Validation:
+    def validate(self, request: ValidationRequest) -> Validation:
         return validate(
-            self.logs, actuator, fidelity=request.fidelity, transient=request.transient,
-            progress=progress,
+            self.logs, request.actuator, fidelity=request.fidelity, transient=request.transient,
+            progress=request.progress,
         )  # fmt: skip
 
 
@@ -174,41 +169,34 @@ class _ClosedLoop:
 
         return [loop_log(log) for log in self.given]
 
-    def calibrate(
-        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
-    ) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.stages.closed_loop import calibrate_loop
         from elevon.calibrate.stages.closed_loop.predict import validate_loop
 
-        _check_loop(actuator, request)
-        structure = actuator.parameters["control.structure"]
+        _check_loop(request)
+        structure = request.actuator.parameters["control.structure"]
         result = calibrate_loop(
-            self.logs, actuator,
+            self.logs, request.actuator,
             # One that the caller sets is no question any more.
             structure=str(structure.value) if structure.confidence == "override" else None,
-            free=request.free, transient=request.transient, progress=progress,
+            free=request.free, transient=request.transient, progress=request.progress,
         )  # fmt: skip
         offsets = None if result.promise is None else result.promise.offsets
         after = validate_loop(self.logs, result.actuator, request.transient, offsets)
         return _with(replace(result, validation=after), *filter(None, [self.why]))
 
-    def validate(
-        self,
-        actuator: Actuator,
-        request: ValidationRequest,
-        progress: Progress | None,  # noqa: ARG002 - a few runs, of the low fidelity
-    ) -> Validation:
+    def validate(self, request: ValidationRequest) -> Validation:
         from elevon.calibrate.stages.closed_loop.predict import validate_loop
 
-        return validate_loop(self.logs, actuator, request.transient)
+        return validate_loop(self.logs, request.actuator, request.transient)
 
 
-def _check_loop(actuator: Actuator, request: CalibrationRequest) -> None:
+def _check_loop(request: CalibrationRequest) -> None:
     """Refuse what the closed loop has no meaning for."""
     from elevon.simulate.prepare import check_fidelity
 
     fidelity = request.fidelity or "low"
-    check_fidelity(actuator.wiring, fidelity)
+    check_fidelity(request.actuator.wiring, fidelity)
     if fidelity != "low":
         raise InputError(
             f"--fidelity {fidelity}: the closed loop is searched over some 10 000 runs, which are "
@@ -228,20 +216,21 @@ class _Balances:
     given: Sequence[Log]
     unit: bool
 
-    def calibrate(
-        self, actuator: Actuator, request: CalibrationRequest, progress: Progress | None
-    ) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.stages import calibrate_parts
 
         result = calibrate_parts(
-            self._read(self.given, actuator), actuator, free=request.free,
-            fidelity=(request.fidelity or "auto") if self.unit else "auto",
-            progress=part(progress, 0.0, 0.3 if request.promise else 1.0),
+            self._read(self.given, request.actuator), request.actuator, free=request.free,
+            fidelity=self._fidelity(request),
+            progress=part(request.progress, 0.0, 0.3 if request.promise else 1.0),
         )  # fmt: skip
         if request.transient is not None or (request.fidelity and not self.unit):
             text = "--transient, and --fidelity without model runs: not used for these logs"
             result = _with(result, text)
         return self._held_out(result, request) if request.promise else result
+
+    def _fidelity(self, request: CalibrationRequest) -> str:
+        return (request.fidelity or "auto") if self.unit else "auto"
 
     @staticmethod
     def _read(logs: Sequence[Log], actuator: Actuator) -> list[Log]:
@@ -271,11 +260,11 @@ class _Balances:
         apart, judged = len(names) > 1, []
         try:
             for name in names:
-                model = self._without(name, result.before, request) if apart else None
+                model = self._without(name, request) if apart else None
                 apart = model is not None
                 way = replace(self, given=[log for log in self.given if log.name == name])
                 fitted = result.actuator if model is None else model
-                judged.append(way.validate(fitted, ValidationRequest(), None))
+                judged.append(way.validate(ValidationRequest(fitted)))
         except ElevonError as error:
             return _with(result, f"no thresholds: {error}")
         errors = tuple(row for item in judged for row in item.errors)
@@ -283,29 +272,27 @@ class _Balances:
         promise = replace(judged[0], errors=errors, traces=(), commands=how)
         return _with(replace(result, promise=promise), *([] if apart else [_FROM_THE_FIT]))
 
-    def _without(self, name: str, before: Actuator, request: CalibrationRequest) -> Actuator | None:
+    def _without(self, name: str, request: CalibrationRequest) -> Actuator | None:
         """Return the actuator calibrated from all other logs; None: they determine too little."""
         from elevon.calibrate.stages import calibrate_parts
 
         others = [log for log in self.given if log.name != name and _ends(log) < _LONG]
-        fidelity = (request.fidelity or "auto") if self.unit else "auto"
+        before, free, fidelity = request.actuator, request.free, self._fidelity(request)
         try:
             read = self._read(others, before)
-            return calibrate_parts(read, before, free=request.free, fidelity=fidelity).actuator
+            return calibrate_parts(read, before, free=free, fidelity=fidelity).actuator
         except InputError:
             return None
 
-    def validate(
-        self, actuator: Actuator, request: ValidationRequest, progress: Progress | None
-    ) -> Validation:
+    def validate(self, request: ValidationRequest) -> Validation:
         from elevon.calibrate.replay import validate_replay
 
         if not self.unit:
-            return _ClosedLoop(self.given).validate(actuator, request, progress)
+            return _ClosedLoop(self.given).validate(request)
         named = [(log.name, _recording(log)) for log in self.given]
         return validate_replay(
-            named, actuator, fidelity=request.fidelity, transient=request.transient,
-            progress=progress,
+            named, request.actuator, fidelity=request.fidelity, transient=request.transient,
+            progress=request.progress,
         )  # fmt: skip
 
 

@@ -96,7 +96,6 @@ def fit_residual(
     belief: Floats | None = None,
     most: int | None = None,
     tolerance: float = 1e-8,
-    gradient: float | None = None,
 ) -> ResidualFit:
     """Fit by robust least squares.
 
@@ -121,9 +120,7 @@ def fit_residual(
     most : int, optional
         Evaluations at most.
     tolerance : float
-        Relative, of cost and step.
-    gradient : float, optional
-        The same of the gradient; default `tolerance`.
+        Relative, of cost, step and gradient.
     """
     from scipy.optimize import least_squares
 
@@ -137,7 +134,7 @@ def fit_residual(
     jac: Any = slopes
     best = least_squares(
         whole, first, jac=jac, loss=_partly(loss, count), f_scale=soft, x_scale=scale,
-        max_nfev=most, ftol=tolerance, xtol=tolerance, gtol=gradient or tolerance, **options,
+        max_nfev=most, ftol=tolerance, xtol=tolerance, gtol=tolerance, **options,
     )  # fmt: skip
     rows = slice(None) if belief is None else slice(0, len(best.fun) - count)
     misfit = np.asarray(best.fun[rows], dtype=np.float64)

@@ -154,10 +154,7 @@ def _imported(
     return ImportedLog(recording, ImportReport(str(path), "recording"), None)
 
 
-def as_logs(
-    given: LogsLike,
-    map: MapLike = None,  # noqa: A002 - as `read_log`
-) -> list[Log]:
+def as_logs(given: LogsLike) -> list[Log]:
     """Return logs: as given, or read from their files, each name once.
 
     Raises
@@ -167,7 +164,7 @@ def as_logs(
     """
     items = [given] if isinstance(given, (Log, str, os.PathLike)) else list(given)
     paths = [item for item in items if not isinstance(item, Log)]
-    read = iter(read_logs([Path(path) for path in paths], map) if paths else ())
+    read = iter(read_logs([Path(path) for path in paths]) if paths else ())
     logs = [item if isinstance(item, Log) else next(read) for item in items]
     names = [log.name for log in logs]
     twice = next((name for name in names if names.count(name) > 1), None)

@@ -9,8 +9,6 @@ from elevon.errors import FormatError, InputError
 from elevon.logs.clocks.sync import align_clocks, find_trigger
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.formats.loadcell import (
-    brake_torque,
-    guide_torque,
     read_loadcell,
     write_loadcell,
 )
@@ -129,13 +127,6 @@ def test_loadcell_written_is_read(tmp_path):
     assert log.unit == "N m"
     with pytest.raises(InputError, match="finite"):
         write_loadcell(tmp_path / "c2.csv", [0.0], [math.inf])
-
-
-def test_torques_of_cells():
-    np.testing.assert_allclose(brake_torque([100.0], 0.2, 4.0), [5.0])
-    np.testing.assert_allclose(guide_torque([75.0], [75.0], 0.08), [12.0])
-    with pytest.raises(InputError):
-        brake_torque([1.0], 0.2, 0.0)
 
 
 def test_a_load_cell_beside_the_log_is_joined(tmp_path, truth):

@@ -9,13 +9,19 @@ from elevon.errors import InputError, UnknownNameError
 from elevon.estimate.covariance import robust_covariance
 from elevon.logs.command.fit import best_waveform, fit_waveform
 from elevon.logs.command.guess import FREE
-from elevon.logs.command.reconstruct import CommandTrace, reconstruct, reconstruct_from
+from elevon.logs.command.reconstruct import CommandTrace, reconstruct
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.importing import import_log
 from elevon.waveforms import evaluate, wave_records
 from tests.logs.conftest import GAIN, servo_log
 
 DEG = math.pi / 180
+
+
+def reconstruct_from(recording):
+    """Return the command of an imported log."""
+    speed, output = recording["speed_ref"], recording["encoder_position"]
+    return reconstruct(speed.time, speed.values, output.values)
 
 
 def coloured(rng, n, rho, std):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -79,10 +79,13 @@ def fit_waveform(
     kind: str = "sine",
     *,
     fixed: Mapping[str, float] | None = None,
-    window: tuple[float, float] | None = None,
-    timing_std: float | None = None,
 ) -> WaveformFit:
     """Fit a waveform to the valid samples of a command trace.
+
+    The command's beginning and end are found in the trace: a span at rest at either end, and
+    samples that no waveform of this kind explains. The instant at which the drive sampled the
+    command, against the time stamp of the row, is uniform within one period of the log: it is in no
+    residual, so it is added to the phase and the instants.
 
     Parameters
     ----------
@@ -92,13 +95,6 @@ def fit_waveform(
         Waveform, one of `FREE`.
     fixed : mapping of str to float, optional
         Parameters that are known and not fitted (SI).
-    window : (float, float), optional
-        Seconds used. By default the command's beginning and end are found in the trace: a span at
-        rest at either end, and samples that no waveform of this kind explains.
-    timing_std : float, optional
-        Standard deviation [s] of the instant at which the drive sampled the command, against the
-        time stamp of the row. It is in no residual, so it is added to the phase and the instants.
-        Default: uniform within one period of the log.
 
     Returns
     -------
@@ -117,25 +113,23 @@ def fit_waveform(
     for name in known:
         if name not in names:
             raise unknown("parameter", name, names, f"waveform {kind}")
-    t, y = _selected(trace, window)
-    moving = window is None and kind not in {"constant", "step", "ramp", "trapezoid"}
+    t, y = _selected(trace)
+    moving = kind not in {"constant", "step", "ramp", "trapezoid"}
     if moving:
         t, y = _without_rest(t, y)
     free = [name for name in FREE[kind] if name not in known]
-    values, jacobian, residual, converged = _best(kind, t, y, known, free=free)
+    best = _best(kind, t, y, known, free=free)
     for _ in range(3 if moving else 0):
-        first = _first_explained(t, residual)
+        first = _first_explained(t, best.residual)
         if first == 0 or len(t) - first < max(_LEAST, len(t) // 4):
             break
         t, y = t[first:], y[first:]
-        values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
-    strays = _strays(y, residual)
+        best = _best(kind, t, y, known, free=free, start=best.values)
+    strays = _strays(y, best.residual)
     if strays.any():
         t, y = t[~strays], y[~strays]
-        values, jacobian, residual, converged = _best(kind, t, y, known, free=free, start=values)
-    solution = (jacobian, residual, converged)
-    fit = _result(kind, values, free, t, solution, timing_std=timing_std)
-    return replace(fit, outliers=int(strays.sum()))
+        best = _best(kind, t, y, known, free=free, start=best.values)
+    return replace(_result(kind, free, t, best), outliers=int(strays.sum()))
 
 
 def best_waveform(
@@ -151,7 +145,7 @@ def best_waveform(
     InputError
         Too few valid samples for any of them.
     """
-    t, y = _selected(trace, None)
+    t, y = _selected(trace)
     step = max(1, len(t) // _SCORED)
     t, y = t[::step], y[::step]
     thin = CommandTrace(t, y, np.ones(len(t), dtype=bool))
@@ -167,10 +161,8 @@ def best_waveform(
     return fit_waveform(trace, min(scored)[1])
 
 
-def _selected(trace: CommandTrace, window: tuple[float, float] | None) -> tuple[Floats, Floats]:
-    mask = trace.valid.copy()
-    if window is not None:
-        mask &= (trace.time >= window[0]) & (trace.time <= window[1])
+def _selected(trace: CommandTrace) -> tuple[Floats, Floats]:
+    mask = trace.valid
     if int(mask.sum()) < _LEAST:
         raise InputError(
             f"command: {int(mask.sum())} samples with the speed set point inside its limit; "
@@ -206,6 +198,15 @@ def _strays(y: Floats, residual: Floats) -> Bools:
     return far if far.mean() <= _FEW else np.zeros_like(far)
 
 
+class _Solved(NamedTuple):
+    """A waveform's values, and the fit that found them: residuals are data less waveform."""
+
+    values: dict[str, float]
+    jacobian: Floats
+    residual: Floats
+    converged: bool
+
+
 def _best(
     kind: str,
     t: Floats,
@@ -214,7 +215,7 @@ def _best(
     *,
     free: Sequence[str],
     start: Mapping[str, float] | None = None,
-) -> tuple[dict[str, float], Floats, Floats, bool]:
+) -> _Solved:
     """Least squares from each guess, the best carried to its end.
 
     Returns its values, Jacobian (n, p), residual, and whether it converged.
@@ -232,13 +233,13 @@ def _best(
     for guess in [start] if start is not None else guesses(kind, t, y, known):
         base = {**guess, **known}
         if not free:
-            return base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True
+            return _Solved(base, np.empty((len(t), 0)), y - evaluate(kind, base, t), True)
         rough = solve(base, np.array([base[name] for name in free]), _ROUGH)
         results.append((rough.cost, base, rough))
     _, base, rough = min(results, key=lambda item: item[0])
     solution = rough if rough.converged else solve(base, rough.x, _MOST)
     values = {**base, **dict(zip(free, map(float, solution.x), strict=True))}
-    return values, solution.jacobian, -solution.residual, solution.converged
+    return _Solved(values, solution.jacobian, -solution.residual, solution.converged)
 
 
 def _model(
@@ -264,24 +265,15 @@ def _typical(name: str, y: Floats, spread: float) -> float:
     return max(float(np.ptp(y)), 1e-12)
 
 
-def _result(
-    kind: str,
-    values: dict[str, float],
-    free: Sequence[str],
-    t: Floats,
-    solution: tuple[Floats, Floats, bool],
-    *,
-    timing_std: float | None,
-) -> WaveformFit:
-    jacobian, residual, converged = solution
+def _result(kind: str, free: Sequence[str], t: Floats, best: _Solved) -> WaveformFit:
+    values, jacobian, residual, converged = best
     if values.get("amplitude", 1.0) < 0.0 and "phase" in free:
         values["amplitude"], values["phase"] = -values["amplitude"], values["phase"] + math.pi
         jacobian = jacobian * np.where(np.array(free) == "amplitude", -1.0, 1.0)
     if "phase" in values:
         values["phase"] = math.remainder(values["phase"], 2.0 * math.pi)
     covariance = _covariance(kind, free, jacobian, residual)
-    if timing_std is None:
-        timing_std = float(np.median(np.diff(t))) / math.sqrt(12.0)
+    timing_std = float(np.median(np.diff(t))) / math.sqrt(12.0)
     shift = _per_second(values, free)
     covariance += timing_std**2 * np.outer(shift, shift)
     std = {name: float(math.sqrt(covariance[k, k])) for k, name in enumerate(free)}

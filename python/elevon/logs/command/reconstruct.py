@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from elevon.arrays import Bools, Floats
 from elevon.errors import InputError, RangeError
-from elevon.recording import Recording
 
 POSITION_GAIN = 1000.0 / 60.0 * 124.0  # 1/s, output rad to motor-shaft rad/s
 SPEED_LIMIT = 500.0 * math.pi / 30.0  # rad/s
@@ -93,24 +92,3 @@ def reconstruct(
     position = speed / gain + output
     valid = np.isfinite(position) & (np.abs(speed) < limit * (1.0 - _MARGIN))
     return CommandTrace(t, position, valid)
-
-
-def reconstruct_from(
-    recording: Recording, *, gain: float = POSITION_GAIN, limit: float = SPEED_LIMIT
-) -> CommandTrace:
-    """Rebuild the command of a recording that holds ``speed_ref`` and ``encoder_position``.
-
-    Raises
-    ------
-    UnknownNameError
-        One of the two channels is missing.
-    InputError
-        They are on different clocks.
-    """
-    speed, output = recording["speed_ref"], recording["encoder_position"]
-    if speed.clock.name != output.clock.name:
-        raise InputError(
-            f"command: speed_ref is on clock {speed.clock.name!r}, encoder_position on "
-            f"{output.clock.name!r}; they must share one"
-        )
-    return reconstruct(speed.time, speed.values, output.values, gain=gain, limit=limit)

@@ -48,23 +48,6 @@ class LoadCellLog:
     notes: tuple[str, ...]
 
 
-def brake_torque(force: npt.ArrayLike, arm: float, chain_ratio: float) -> Floats:
-    """Brake torque on the motor shaft [N m] from the force [N] at an arm [m] of the brake shaft.
-
-    The chain divides it: the brake shaft turns `chain_ratio` times slower than the motor.
-    """
-    _positive("arm", arm)
-    _positive("chain_ratio", chain_ratio)
-    return np.asarray(force, dtype=np.float64) * (arm / chain_ratio)
-
-
-def guide_torque(force_1: npt.ArrayLike, force_2: npt.ArrayLike, radius: float) -> Floats:
-    """Torque [N m] of two cables on the winding guide of `radius` [m]: (F1 + F2) r."""
-    _positive("radius", radius)
-    total = np.asarray(force_1, dtype=np.float64) + np.asarray(force_2, dtype=np.float64)
-    return np.asarray(total * radius, dtype=np.float64)
-
-
 def write_loadcell(
     path: str | os.PathLike[str],
     time: npt.ArrayLike,
@@ -160,8 +143,3 @@ def _value_unit(source: str, unit: str) -> tuple[float, str, Notes]:
         note = f"load-cell value in {unit}: converted with g = {_GRAVITY} m/s2"
         return _GRAVITY * (1.0 if unit == "kg" else 1e-3), "N", (note,)
     return 1.0, _UNITS[unit], ()
-
-
-def _positive(name: str, value: float) -> None:
-    if not value > 0.0:
-        raise RangeError(f"load cell: {name} = {value!r} must be above 0")

@@ -180,15 +180,13 @@ def final_fit(
     chosen: Searched,
     *,
     rounds: int = 10,
-    free: Sequence[Free] | None = None,
     check: Check = lambda: True,
     advance: Callable[[float], object] = lambda _f: None,
 ) -> Fitted:
     """Fit whole logs from the best point of the search, deviations renewed between rounds."""
     model = LoopModel(actuator, logs, chosen.structure, check)
-    items = tuple(free) if free is not None else chosen.free
-    lanes = model.lanes(items)
-    x = inner(items, outer(chosen.free, chosen.x))
+    lanes = model.lanes(chosen.free)
+    x = inner(chosen.free, outer(chosen.free, chosen.x))
     for number in range(3):
         lanes.refresh(x)
         x = lanes.solve(x[None, :], rounds=rounds, central=number == 2)[0].x
