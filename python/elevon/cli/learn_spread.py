@@ -48,12 +48,11 @@ def learn_spread(
 
 
 def _print(result: LearnedSpread, path: Path) -> None:
-    of = f"{result.days} days of {result.units} unit{'s' * (result.units > 1)}"
-    answer(f"spread learnt: {of}, {result.logs} logs -> {path}")
-    far = sorted(result.features.items(), key=lambda row: -abs(row[1].days.value - 1.0))
-    rows = [
-        (name, *(f"{x:.2f}" for x in (*row.days.root(), *row.mismatch.root()))) for name, row in far
-    ]
+    counts = (("day", result.days), ("unit", result.units), ("log", result.logs))
+    days, units, logs = (f"{count} {name}{'s' * (count != 1)}" for name, count in counts)
+    answer(f"spread learnt: {days} of {units}, {logs} -> {path}")
+    far = sorted(result.shown().items(), key=lambda row: -abs(float(row[1][0]) - 1.0))
+    rows = [(name, *(f"{x:.2f}" for x in values)) for name, values in far]
     columns = ("feature", "day to day", "low", "high", "mismatch", "low", "high")
     print_table(columns, rows, title="deviations over those stated, with 90 % intervals")
     answer(result.threshold_text(_RATE))

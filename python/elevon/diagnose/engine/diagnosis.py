@@ -119,6 +119,13 @@ def _with_plausibility(
     return weigh_plausibility(result, score, degrees, *allowed(cases, sets, runs))
 
 
+def judged(cases: Sequence[LogCase], candidates: Sequence[CandidateFault]) -> float:
+    """Return how often a healthy unit deviates as much, by draws: what an alarm is decided by."""
+    residual, root, detector = detector_of(cases, candidates)
+    score = float(detector.score((root @ residual)[None, :])[0])
+    return _judged(detector, score, cases, 1.0, None)[0]
+
+
 def _judged(
     detector: Detector,
     score: float,
@@ -128,17 +135,19 @@ def _judged(
 ) -> tuple[float, bool]:
     """Return how often a healthy unit deviates as much, and whether that is an alarm.
 
-    Where there is something that no candidate moves, it has its share of the false alarms.
+    Where there is something that no candidate moves, it has its share of the false alarms. Of one
+    log the rank among those that the spread was learnt of must say so, too: draws that are too
+    narrow raise no alarm that it does not.
     """
     plausible = [case.plausible for case in cases]
     share = SHARE if any(item.names for item in plausible) else 0.0
-    chance = min(detector.chance(score) / (1.0 - share), 1.0)
-    faulty = score > detector.threshold(rate * (1.0 - share))
-    if spread is not None and len(cases) == 1:
-        chance = spread.chance(detector.chance(score), cases[0].unit.baselines, rate)
-        faulty = chance <= rate
     odd = chance_of_any(plausible) / SHARE
-    return min(chance, odd), faulty or odd <= rate
+    chance = min(detector.chance(score) / (1.0 - share), 1.0, odd)
+    faulty = score > detector.threshold(rate * (1.0 - share)) or odd <= rate
+    if spread is not None and len(cases) == 1:
+        rank = spread.rank(chance, cases[0].unit.baselines, rate)
+        chance, faulty = max(chance, rank), faulty and rank <= rate
+    return chance, faulty
 
 
 def _status(

@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.draws import chi_square, normal
+from elevon.diagnose.engine.draws import normal
 from elevon.diagnose.engine.replay import Replay
-from elevon.diagnose.engine.spread import LearnedSpread, StepVariance, stated
+from elevon.diagnose.engine.spread import LearnedSpread, StepVariance, stated, variances
 from elevon.diagnose.engine.table import Feature, FeatureVector, deviations
 
 _FAR = 2.0  # deviations
+_OTHER = 1000  # of the seed: draws of the offset's size are apart from the steps'
 Bools = npt.NDArray[np.bool_]
 
 
@@ -41,8 +42,9 @@ class Healthy:
         how far it deviates from the model.
     steps : StepVariance
         What is known of the spread's size.
-    offset_worth : ndarray, shape (k,)
-        Runs that the offset's size is known by, where it is no matter of the spread.
+    offsets : StepVariance
+        The same of the offset's size, where it is no matter of the spread; without a common factor
+        it has that of the spread.
     by_days : ndarray of bool, shape (k,)
         Where baselines leave of the offset their own scatter, as large as the spread is.
     """
@@ -55,7 +57,7 @@ class Healthy:
     scale: Floats
     offset: Floats
     steps: StepVariance
-    offset_worth: Floats
+    offsets: StepVariance
     by_days: Bools
 
     def drawn(self, count: int, noise: Floats, seed: int) -> Floats:
@@ -68,8 +70,10 @@ class Healthy:
         step = self.covariance - self.offset
         step = step / np.outer(self.scale, self.scale) + np.diag(noise**2)
         out = _correlated(step, count, (seed, 3)) * np.sqrt(factor)
-        square = chi_square(count, tuple(self.offset_worth.tolist()), (seed, 2))
-        size = np.sqrt(common * self.offset_worth / square)
+        own, _ = self.offsets.drawn(count, _OTHER + seed)
+        if not len(self.offsets.common):
+            own = own * common
+        size = np.sqrt(own / self.offsets.value)
         size[:, self.by_days] = np.sqrt(factor[:, self.by_days]) / self.scale[self.by_days]
         out += _correlated(self.offset, count, (seed, 4)) * size
         return out
@@ -116,26 +120,29 @@ def healthy(
     level = values.mean(axis=0) if count else mean
     known = stated(len(names)) if spread_known is None else spread_known.of(names)
     spread = model.spread[np.ix_(at, at)] + np.diag(deviations(records, level, "repeats") ** 2)
-    spread *= np.sqrt(np.outer(known.days, known.days))
     off = np.diag(deviations(records, level, "mismatch") ** 2) + np.outer(
         common_error, common_error
     )
-    off *= np.sqrt(np.outer(known.mismatch, known.mismatch))
-    steps = StepVariance(known.worth, np.zeros(len(at)))
-    scale, by_days = np.ones(len(at)), np.zeros(len(at), dtype=np.bool_)
-    left, moved = off, np.zeros(len(at))
+    steps, offsets = variances(known)
+    shared = 0.0
+    centre, noise, by_days = np.zeros(len(at)), np.zeros(len(at)), np.zeros(len(at), dtype=np.bool_)
     if count:
         residual = values - mean
         noise = np.array([b.only(names).std ** 2 for b in baselines]).mean(axis=0)
         centre = residual.mean(axis=0)
-        scatter = np.sum((residual - centre) ** 2, axis=0) / (np.diag(spread) + noise)
-        alone = centre**2 / (np.diag(off) + (np.diag(spread) + noise) / count)
-        steps = StepVariance(known.worth, scatter, count - 1)
-        if spread_known is None:
-            steps = StepVariance.of(known.worth, scatter, count - 1, alone)
-        scale = steps.value
-        spread *= np.sqrt(np.outer(scale, scale))
-        of_mean = (spread + np.diag(noise)) / count
+        stated_step = np.diag(spread) + noise
+        scatter = np.sum((residual - centre) ** 2, axis=0) / stated_step
+        shared = _shared(scatter / steps.value, count - 1)
+        told = max(1.0 - 2.0 * shared, 0.0)  # of one day, baselines tell nothing of days
+        scatter *= told / (1.0 - min(shared, 0.5))
+        alone = centre**2 / (np.diag(off) + stated_step / count)
+        steps, offsets = variances(known, scatter, told * (count - 1), alone)
+    scale = steps.value
+    spread *= np.sqrt(np.outer(scale, scale))
+    off *= np.sqrt(np.outer(offsets.value, offsets.value))
+    left, moved = off, np.zeros(len(at))
+    if count:
+        of_mean = (spread + np.diag(noise)) * (shared + (1.0 - shared) / count)
         off = _yielding(off, of_mean, centre)
         gain = off @ np.linalg.inv(off + of_mean)
         left, moved = (off - gain @ off, gain @ centre) if model.prior else (of_mean, centre)
@@ -148,8 +155,17 @@ def healthy(
     degrees = model.degrees + max(count - 1, 0)
     return Healthy(
         tuple(names), mean + moved, spread + left, degrees, count, np.sqrt(scale), left, steps,
-        known.mismatch_worth, by_days,
+        offsets, by_days,
     )  # fmt: skip
+
+
+def _shared(ratio: Floats, free: int) -> float:
+    """Return the share of a step's variance that baselines have in common.
+
+    Nobody says whether they are of one day. Where they scatter less than days do, by all features,
+    what is lacking is the same in all of them: then they are worth one.
+    """
+    return max(1.0 - float(np.mean(ratio)) / free, 0.0) if free else 0.0
 
 
 def _yielding(off: Floats, of_mean: Floats, centre: Floats) -> Floats:

@@ -25,49 +25,58 @@ from elevon.files import write_text
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, and of the stated mismatch, in runs
 #: ASSUMED: the same of a feature by itself, beside the factor that all features have in common.
 STATED = 20.0
-#: Density of the logarithm of the factor that all features' variances have in common falls with
-#: its root. ASSUMED: so flat that a few baselines decide; a factor below one is none, as the
-#: stated deviations are least ones.
+#: Of the factor that all features' variances have in common, each as likely. ASSUMED: so wide that
+#: one baseline decides; a factor below one is none, as the stated deviations are least ones.
 _FACTORS = np.geomspace(1.0, 100.0, 61)
-_FAR = 3.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is no matter of all
+_FAR = 8.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is no matter of all
 FORMAT = "elevon-spread"
-_VERSION = 1
+_VERSION = 2
 _ENDS = (0.05, 0.95)
+_SHOWN = 4000  # draws of an interval that is printed
 
 
 class VarianceFactor(NamedTuple):
-    """A variance over the stated one, and in how many runs it is worth that."""
+    """A mean square over the stated variance, and how many runs it was taken over."""
 
     value: float = 1.0
-    degrees: float = DEGREES
-
-    def interval(self) -> tuple[float, float]:
-        """Return the ends of its 90 % interval."""
-        from scipy.stats import chi2
-
-        high, low = (self.value * self.degrees / float(chi2.ppf(q, self.degrees)) for q in _ENDS)
-        return low, high
-
-    def root(self) -> tuple[float, float, float]:
-        """Return the factor of the deviation, with the ends of its 90 % interval."""
-        low, high = self.interval()
-        return math.sqrt(self.value), math.sqrt(low), math.sqrt(high)
+    runs: float = 0.0
 
 
 class FeatureSpread(NamedTuple):
-    """What is known of one feature: its spread from day to day, and the model's mismatch."""
+    """What healthy logs showed of one feature: its steps from day to day, the model's mismatch.
+
+    Attributes
+    ----------
+    days, mismatch : VarianceFactor
+        Mean squares; of no runs where nothing was seen.
+    worth : float
+        Runs that the stated spread is worth beside them: fewer where units differ.
+    """
 
     days: VarianceFactor = VarianceFactor()
     mismatch: VarianceFactor = VarianceFactor()
+    worth: float = STATED
 
 
 class KnownSpread(NamedTuple):
-    """Factors of features, shape (k,) each: of the spread, of the mismatch, with their worth."""
+    """What is known of features before baselines, shape (k,) each, as `StepVariance` has it.
 
-    days: Floats
+    Attributes
+    ----------
+    worth, scatter, free : ndarray, shape (k,)
+        Of the steps from day to day.
+    mismatch_scatter, mismatch_free : ndarray, shape (k,)
+        Of the units' offsets.
+    learnt : bool
+        Whether it was learnt: then the offsets' size is apart from the steps'.
+    """
+
     worth: Floats
-    mismatch: Floats
-    mismatch_worth: Floats
+    scatter: Floats
+    free: Floats
+    mismatch_scatter: Floats
+    mismatch_free: Floats
+    learnt: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,16 +84,16 @@ class StepVariance:
     """Variances of a unit's steps from day to day over the stated ones: what is known of them.
 
     Each feature's is a factor that all features have in common, times one of its own (scaled
-    inverse chi-square about one). Baselines tell both: few of them the common one well, as
-    every feature counts for it.
+    inverse chi-square about one). Healthy days tell both: few of them the common one well, as
+    every feature counts for it. Offsets of units from the model are known in the same form.
 
     Attributes
     ----------
     worth : ndarray, shape (k,)
         Runs that the prior of a feature's own factor is worth.
     scatter : ndarray, shape (k,)
-        Sum of squares of the baselines about their mean, over the stated variance.
-    free : int
+        Sum of squares of days about their mean, over the stated variance.
+    free : ndarray, shape (k,), or float
         Its degrees of freedom.
     common : ndarray, shape (m,)
         Probability of each of `_FACTORS`; none: there is no common factor.
@@ -92,27 +101,32 @@ class StepVariance:
 
     worth: Floats
     scatter: Floats
-    free: int = 0
+    free: Floats | float = 0.0
     common: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    def of(cls, worth: Floats, scatter: Floats, free: int, alone: Floats) -> StepVariance:
-        """Weigh a common factor by baselines.
+    def of(
+        cls,
+        worth: Floats,
+        scatter: Floats,
+        free: Floats | float,
+        alone: Floats | None = None,
+        alone_free: Floats | float = 1.0,
+    ) -> StepVariance:
+        """Weigh a common factor by healthy days.
 
         Parameters
         ----------
         worth, scatter, free
             As above.
-        alone : ndarray, shape (k,)
-            Square of the baselines' mean less the model's, over its stated variance.
+        alone : ndarray, shape (k,), optional
+            Sum of squares of units' means less the model's, over its stated variance.
+        alone_free : ndarray, shape (k,), or float
+            Its degrees of freedom.
         """
-        from scipy.stats import f as fisher
-
-        log = -0.5 * np.log(_FACTORS)
-        seen = [(alone, 1, np.minimum(worth, _FAR)), (scatter / max(free, 1), free, worth)]
-        for ratio, degrees, tail in seen if free else seen[:1]:
-            each = np.maximum(ratio, 1e-9) / _FACTORS[:, None]
-            log += np.sum(fisher.logpdf(each, degrees, tail) - np.log(_FACTORS)[:, None], axis=1)
+        log = _told(scatter, free, worth)
+        if alone is not None:
+            log = log + _told(alone, alone_free, np.minimum(worth, _FAR))
         weight = np.exp(log - log.max())
         return cls(worth, scatter, free, weight / weight.sum())
 
@@ -120,7 +134,7 @@ class StepVariance:
     def value(self) -> Floats:
         """The factors, shape (k,)."""
         middle = 1.0 / float(np.sum(self.common / _FACTORS)) if len(self.common) else 1.0
-        return (self.worth * middle + self.scatter) / (self.worth + self.free)
+        return np.asarray((self.worth * middle + self.scatter) / (self.worth + self.free))
 
     def drawn(self, count: int, seed: int) -> tuple[Floats, Floats]:
         """Draw factors, shape (count, k), and the common one of each draw, shape (count, 1)."""
@@ -130,6 +144,39 @@ class StepVariance:
             common = _FACTORS[np.minimum(at, len(_FACTORS) - 1)][:, None]
         square = chi_square(count, tuple((self.worth + self.free).tolist()), (seed, 1))
         return (self.worth * common + self.scatter) / square, common
+
+    def roots(self) -> Floats:
+        """Return the deviations over the stated ones: middle and 90 % interval, shape (3, k)."""
+        factors, _ = self.drawn(_SHOWN, 5)
+        return np.asarray(np.sqrt(np.quantile(factors, (0.5, *_ENDS), axis=0)), dtype=np.float64)
+
+
+def _told(scatter: Floats, free: Floats | float, tail: Floats) -> Floats:
+    """Log likelihood of each common factor by sums of squares, which follow Fisher's law."""
+    from scipy.stats import f as fisher
+
+    degrees = np.broadcast_to(np.asarray(free, dtype=np.float64), scatter.shape)
+    seen = degrees > 0.0
+    ratio = np.maximum(scatter[seen] / degrees[seen], 1e-9) / _FACTORS[:, None]
+    each = fisher.logpdf(ratio, degrees[seen], tail[seen]) - np.log(_FACTORS)[:, None]
+    return np.asarray(each.sum(axis=1), dtype=np.float64)
+
+
+class HeldOut(NamedTuple):
+    """A learnt log's chance by what the others say.
+
+    Attributes
+    ----------
+    test, group : int
+        Its test; its unit, or its day where all logs are of one unit.
+    alone, based : float
+        Chance that draws give it without a baseline, and with one of another day; of none: one.
+    """
+
+    test: int
+    group: int
+    alone: float
+    based: float
 
 
 @dataclass(frozen=True)
@@ -144,9 +191,8 @@ class LearnedSpread:
         Learnt from; a unit's days are counted apart from another's.
     features : mapping of str to FeatureSpread
         By name; the stated ones hold where a feature is missing.
-    alone, based : tuple of float
-        Chance that draws give each learnt log, held out by its day: without a baseline, and with
-        one of another day.
+    held_out : tuple of HeldOut
+        Every learnt log.
     """
 
     actuator: str = ""
@@ -154,51 +200,76 @@ class LearnedSpread:
     units: int = 0
     days: int = 0
     features: Mapping[str, FeatureSpread] = field(default_factory=dict)
-    alone: tuple[float, ...] = ()
-    based: tuple[float, ...] = ()
+    held_out: tuple[HeldOut, ...] = ()
 
     def of(self, names: Sequence[str]) -> KnownSpread:
         """Return what is known of features."""
         rows = [self.features.get(name, FeatureSpread()) for name in names]
-        table = np.array([[*r.days, *r.mismatch] for r in rows], dtype=np.float64).reshape(-1, 4)
-        return KnownSpread(*table.T)
+        table = np.array([[r.worth, *r.days, *r.mismatch] for r in rows], dtype=np.float64)
+        worth, days, runs, mismatch, units = table.reshape(-1, 5).T
+        return KnownSpread(worth, days * runs, runs, mismatch * units, units, learnt=True)
+
+    def shown(self) -> dict[str, Floats]:
+        """Return deviations over the stated ones by name, shape (6,).
+
+        From day to day, and of the mismatch: middle, ends of its 90 % interval.
+        """
+        known = self.of(tuple(self.features))
+        days, offsets = variances(known)
+        return dict(zip(self.features, np.vstack([days.roots(), offsets.roots()]).T, strict=True))
+
+    @property
+    def groups(self) -> int:
+        """Units of the test that fewest were learnt of, or days where all are of one unit."""
+        tests = {row.test for row in self.held_out}
+        return min((len({r.group for r in self.held_out if r.test == t}) for t in tests), default=0)
 
     def enough(self, rate: float) -> bool:
         """Whether a conformal threshold reaches a rate of false alarms."""
-        return self.days >= needed(rate)
+        return self.groups >= needed(rate)
 
-    def chance(self, chance: float, baselines: int, rate: float) -> float:
-        """Return how often a healthy log has such a chance: conformal, where that reaches a rate.
+    def rank(self, chance: float, baselines: int, rate: float) -> float:
+        """Return how often a healthy log has such a chance, by its rank among held-out ones.
 
-        The rank among the held-out healthy logs (Vovk, Gammerman and Shafer, 2005, chapter 2);
-        it holds for a day that is exchangeable with theirs, whatever the features' distribution.
+        It holds for a unit, or for a day of the one unit, that is exchangeable with theirs,
+        whatever the features' distribution (Vovk, Gammerman and Shafer, 2005, chapter 2). A
+        group's logs share one weight. Which of the tests a log is of nobody says: the largest
+        holds for each. Where it does not reach the rate it is nought.
         """
-        scores = self.based if baselines else self.alone
-        if not scores or not self.enough(rate):
-            return chance
-        return (1.0 + sum(c <= chance for c in scores)) / (len(scores) + 1.0)
+        if not self.enough(rate):
+            return 0.0
+        below: dict[tuple[int, int], list[bool]] = {}
+        for row in self.held_out:
+            seen = (row.based if baselines else row.alone) <= chance
+            below.setdefault((row.test, row.group), []).append(seen)
+        tests = {test for test, _ in below}
+        shares = [[float(np.mean(x)) for (t, _), x in below.items() if t == k] for k in tests]
+        return max((1.0 + sum(each)) / (len(each) + 1.0) for each in shares)
 
     def threshold_text(self, rate: float) -> str:
         """Say what a threshold stands on."""
-        how = "conformal" if self.enough(rate) else "by draws of what is not known of the spread"
+        of = "units" if self.units > 1 else "days"
+        how = "by draws of what is not known of the spread"
+        if self.enough(rate):
+            how += ", and conformal: an alarm passes both"
         return (
-            f"threshold {how}: {self.days} healthy days were learnt, a conformal one at "
-            f"{100.0 * rate:g} % needs {needed(rate)}"
+            f"threshold {how}; {self.groups} healthy {of} of each test were learnt, a conformal "
+            f"one at {100.0 * rate:g} % needs {needed(rate)}"
         )
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         rows = {
             name: {
-                "days": row.days.value, "days_worth": row.days.degrees,
-                "mismatch": row.mismatch.value, "mismatch_worth": row.mismatch.degrees,
+                "days": row.days.value, "days_runs": row.days.runs, "worth": row.worth,
+                "mismatch": row.mismatch.value, "mismatch_runs": row.mismatch.runs,
             }
             for name, row in self.features.items()
         }  # fmt: skip
         return {
             "format": FORMAT, "version": _VERSION, "actuator": self.actuator, "logs": self.logs,
-            "units": self.units, "days": self.days, "alone": list(self.alone),
-            "based": list(self.based), "features": rows,
+            "units": self.units, "days": self.days,
+            "held_out": [list(row) for row in self.held_out], "features": rows,
         }  # fmt: skip
 
     def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
@@ -211,7 +282,10 @@ class LearnedSpread:
         """
         data = self.to_dict()
         rows = data.pop("features")
-        lines = ["# Variances over those that the package states, and their worth in runs."]
+        lines = [
+            "# Mean squares over the variances that the package states, and their runs.",
+            "# held_out: test, unit (of one unit: day), chance alone, with one baseline.",
+        ]
         lines += [f"{name} = {json.dumps(value)}" for name, value in data.items()]
         for name, row in rows.items():
             values = ", ".join(f"{key} = {value!r}" for key, value in row.items())
@@ -229,25 +303,70 @@ class LearnedSpread:
         """
         document = read_toml(Path(path))
         data = dict(document.data)
-        if data.pop("format", None) != FORMAT or data.pop("version", None) != _VERSION:
+        if data.pop("format", None) != FORMAT:
             raise FormatError(f"{path}: no file of elevon learn-spread (format = {FORMAT!r})")
+        version = data.pop("version", None)
+        if version != _VERSION:
+            raise FormatError(
+                f"{path}: elevon learn-spread wrote it in version {version!r} of its format, not "
+                f"{_VERSION}: learn it again"
+            )
         try:
             rows = data.pop("features", {})
             features = {name: _row(document, name, row) for name, row in rows.items()}
-            alone, based = (tuple(map(float, data.pop(name))) for name in ("alone", "based"))
-            return cls(features=features, alone=alone, based=based, **data)
+            held_out = tuple(
+                HeldOut(int(test), int(group), float(alone), float(based))
+                for test, group, alone, based in data.pop("held_out")
+            )
+            return cls(features=features, held_out=held_out, **data)
         except (TypeError, AttributeError, KeyError, ValueError) as error:
             raise FormatError(f"{path}: a key is missing or of another kind: {error}") from None
 
 
+def variances(
+    known: KnownSpread,
+    scatter: Floats | float = 0.0,
+    free: float = 0.0,
+    alone: Floats | None = None,
+) -> tuple[StepVariance, StepVariance]:
+    """Return what is known of steps from day to day and of offsets, with baselines' scatter.
+
+    Of the stated spread baselines tell one common factor of both; without a baseline there is
+    none. Of a learnt one each has its own, which the learnt logs tell as well.
+
+    Parameters
+    ----------
+    known : KnownSpread
+        Before baselines.
+    scatter, free, alone
+        As in `StepVariance.of`, of the baselines.
+    """
+    total, degrees = known.scatter + scatter, known.free + free
+    stated_worth = np.full(len(known.worth), STATED)
+    if not known.learnt:
+        steps = StepVariance(known.worth, total, degrees)
+        if alone is not None:
+            steps = StepVariance.of(known.worth, total, degrees, alone)
+        return steps, StepVariance(stated_worth, known.mismatch_scatter, known.mismatch_free)
+    off, units = known.mismatch_scatter, known.mismatch_free
+    if alone is not None:
+        off, units = off + alone, units + 1.0
+    none = np.zeros(len(off))
+    common = StepVariance.of(stated_worth, none, 0.0, off, units).common
+    offsets = StepVariance(stated_worth, known.mismatch_scatter, known.mismatch_free, common)
+    return StepVariance.of(known.worth, total, degrees), offsets
+
+
 def stated(count: int) -> KnownSpread:
     """Return what is known of features whose spread was not learnt."""
-    one, worth = np.ones(count), np.full(count, STATED)
-    return KnownSpread(one, worth, one, worth)
+    none = np.zeros(count)
+    return KnownSpread(np.full(count, STATED), none, none, none, none)
 
 
 def needed(rate: float) -> int:
-    """Return how many healthy days a conformal threshold needs: the least n of 1/(n + 1) <= rate.
+    """Return how many healthy days or units a conformal threshold needs.
+
+    The least n of 1/(n + 1) <= rate.
 
     >>> needed(0.05), needed(0.01)
     (19, 99)
@@ -256,8 +375,11 @@ def needed(rate: float) -> int:
 
 
 def _row(document: Document, name: str, row: Mapping[str, float]) -> FeatureSpread:
-    values = [float(row[k]) for k in ("days", "days_worth", "mismatch", "mismatch_worth")]
-    if len(row) != 4 or not all(math.isfinite(v) and v > 0.0 for v in values):
+    keys = ("days", "days_runs", "mismatch", "mismatch_runs", "worth")
+    days, runs, mismatch, units, worth = (float(row[key]) for key in keys)
+    known = all(math.isfinite(v) and v >= 0.0 for v in (days, runs, mismatch, units))
+    if len(row) != len(keys) or not known or not (math.isfinite(worth) and worth > 0.0):
         place = document.place(("features", name))
-        raise FormatError(f"{place}: days, mismatch and their worth must be above zero, not {row}")
-    return FeatureSpread(VarianceFactor(*values[:2]), VarianceFactor(*values[2:]))
+        raise FormatError(f"{place}: mean squares and runs must be nought or more, worth above it, "
+                          f"not {row}")  # fmt: skip
+    return FeatureSpread(VarianceFactor(days, runs), VarianceFactor(mismatch, units), worth)

@@ -1,14 +1,15 @@
 """Spread from day to day and mismatch of the model, from healthy logs: stated ones are priors.
 
-A log's feature is y = model + offset(unit) + step(unit, day) + noise. The variance of a step is v
-times the stated one, that of an offset q times, feature by feature. Their priors are scaled inverse
-chi-square about one, worth `DEGREES` runs. v has the same form afterwards, in closed form; q is
-summed over a grid. Tests of one unit share its days and its offset, so together they count once.
+A log's feature is y = model + offset(unit) + step(unit, day) + noise. Of each feature the mean
+squares of steps and of offsets over the stated variances are taken, with their degrees of freedom;
+`engine.spread` weighs them against the stated ones, by a factor that all features have in common
+and one of each. Tests of one unit share its days and its offset, so together they count once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -18,12 +19,20 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.diagnose.by_model import reading_of
 from elevon.diagnose.engine.candidates import CandidateFault, candidates_of
-from elevon.diagnose.engine.case import LogCase, chance_of, transferred
+from elevon.diagnose.engine.case import SUSPECT, LogCase, transferred
+from elevon.diagnose.engine.diagnosis import judged
 from elevon.diagnose.engine.healthy import healthy
+from elevon.diagnose.engine.plausibility import plausibility
 from elevon.diagnose.engine.replay import Replay, replay
-from elevon.diagnose.engine.spread import DEGREES, FeatureSpread, LearnedSpread, VarianceFactor
-from elevon.diagnose.engine.table import FeatureVector, deviations
-from elevon.errors import InputError, Interrupted
+from elevon.diagnose.engine.spread import (
+    STATED,
+    FeatureSpread,
+    HeldOut,
+    LearnedSpread,
+    VarianceFactor,
+)
+from elevon.diagnose.engine.table import deviations
+from elevon.errors import ElevonWarning, InputError, Interrupted
 from elevon.progress import Progress
 from elevon.threads import one_blas_thread
 
@@ -32,9 +41,8 @@ if TYPE_CHECKING:
     from elevon.diagnose.engine.reading import Reading
     from elevon.logs.log import Log
 
-_GRID = np.geomspace(1e-4, 1e4, 400)  # of q; the inverse chi-square prior is nothing beyond
 _WORTH = np.geomspace(1.0, 300.0, 60)  # runs that one unit's spread is worth for another's
-_UNSURE = 1.0  # deviation of the logarithm of that about `DEGREES`. ASSUMED
+_UNSURE = 1.0  # deviation of the logarithm of that about `STATED`. ASSUMED
 Strings = npt.NDArray[np.str_]
 
 
@@ -67,8 +75,8 @@ class TestResiduals:
     mismatch: Floats
 
     def without(self, unit: str, day: str) -> TestResiduals:
-        """Return the logs of other days."""
-        keep = (self.unit != unit) | (self.day != day)
+        """Return the logs of other days; without a day, of other units."""
+        keep = (self.unit != unit) | ((self.day != day) & bool(day))
         return replace(
             self, unit=self.unit[keep], day=self.day[keep], off=self.off[keep],
             noise=self.noise[keep],
@@ -107,7 +115,7 @@ def learned_spread(
     Raises
     ------
     InputError
-        No log; another number of days; a log that cannot be diagnosed.
+        No log; another number of days; a log that cannot be diagnosed; one given twice.
     Interrupted
         `progress` returned False.
     """
@@ -117,19 +125,89 @@ def learned_spread(
     if len(pairs) != len(logs):
         raise InputError(f"{len(logs)} logs, but units and days of {len(pairs)}")
     candidates = candidates_of(actuator)
+    readings = [reading_of(log, actuator) for log in logs]
+    _apart(readings)
     tests = []
-    for group in _groups([reading_of(log, actuator) for log in logs]):
+    for group in _groups(readings):
         members = [(item, pairs[k]) for k, item in group]
         tests.append(_test(members, candidates))
         done = sum(len(t.models) for t in tests) / len(logs)
         if progress is not None and not progress(0.9 * done):
             raise Interrupted(f"interrupted after {sum(len(t.models) for t in tests)} logs")
     residuals = [t.residuals for t in tests]
-    scores = [_held_out(t, residuals, candidates) for t in tests]
+    rows = [row for k, t in enumerate(tests) for row in _rows(k, t, residuals, candidates)]
     return LearnedSpread(
         actuator.name, len(logs), len({unit for unit, _ in pairs}), len(set(pairs)),
-        fitted(residuals), *(tuple(x for s in scores for x in s[k]) for k in (0, 1)),
+        fitted(residuals), tuple(rows),
     )  # fmt: skip
+
+
+def _rows(
+    number: int,
+    test: _Test,
+    residuals: Sequence[TestResiduals],
+    candidates: Sequence[CandidateFault],
+) -> Iterator[HeldOut]:
+    """A test's logs, each held out; one that looks faulty is told of."""
+    r = test.residuals
+    units = list(dict.fromkeys(str(u) for x in residuals for u in x.unit))
+    days = list(dict.fromkeys(str(d) for x in residuals for d in x.day))
+    known: dict[tuple[str, str], LearnedSpread] = {}
+    for k, item in enumerate(test.readings):
+        # Of several units the whole unit is held out, else the day.
+        unit, day = str(r.unit[k]), "" if len(units) > 1 else str(r.day[k])
+        if (unit, day) not in known:
+            rest = [x for x in (x.without(unit, day) for x in residuals) if len(x.unit)]
+            known[unit, day] = LearnedSpread(features=fitted(rest))
+        spread = known[unit, day]
+        others = np.flatnonzero((r.unit == r.unit[k]) & (r.day != r.day[k]))
+        near = others[np.searchsorted(others, k) % len(others)] if len(others) else None
+        alone = _chance(test, k, [], spread, candidates)
+        # The next day, in turn.
+        based = 1.0 if near is None else _chance(test, k, [int(near)], spread, candidates)
+        if min(alone, based) < SUSPECT:
+            _told(item, _chance(test, k, others.tolist(), spread, candidates))
+        group = units.index(unit) if len(units) > 1 else days.index(day)
+        yield HeldOut(number, group, alone, based)
+
+
+def _chance(
+    test: _Test,
+    number: int,
+    others: Sequence[int],
+    spread: LearnedSpread,
+    candidates: Sequence[CandidateFault],
+) -> float:
+    """Chance of a log with some of the others as baselines."""
+    item, model, names = test.readings[number], test.models[number], test.residuals.names
+    base = [test.readings[k] for k in others]
+    there = [b.features if item.repeats(b) else transferred(b, model) for b in base]
+    unit = healthy(model, names, there, spread_known=spread)
+    plain = plausibility(item, base)
+    case = LogCase("", item.features.only(names), unit, model, plausible=plain)
+    return judged([case], candidates)
+
+
+def _told(item: Reading, chance: float) -> None:
+    """Warn of a log that looks faulty beside all the others of its unit."""
+    if chance < SUSPECT:
+        warnings.warn(
+            f"{item.name} looks faulty itself: by the other logs a healthy day deviates as much in "
+            f"less than {100 * SUSPECT:g} % of logs. It counts as healthy here: learn without it "
+            "unless it is",
+            ElevonWarning,
+            stacklevel=5,
+        )
+
+
+def _apart(readings: Sequence[Reading]) -> None:
+    """Refuse one recording under two names: it would count as two days that are alike."""
+    known: dict[bytes, str] = {}
+    for item in readings:
+        key = item.key()
+        if key in known:
+            raise InputError(f"{item.name} is the same recording as {known[key]}: give it once")
+        known[key] = item.name
 
 
 def _groups(items: Sequence[Reading]) -> list[list[tuple[int, Reading]]]:
@@ -176,14 +254,15 @@ def _test(
 
 
 def fitted(tests: Sequence[TestResiduals]) -> dict[str, FeatureSpread]:
-    """Return what healthy logs say of each feature's spread and mismatch."""
+    """Return what healthy logs show of each feature's spread and mismatch."""
     out = {}
     for name in dict.fromkeys(n for test in tests for n in test.names):
         columns = [_column(test, name) for test in tests if name in test.names]
         units = sorted({str(u) for c in columns for u in c.unit})
         scatter = [row for unit in units if (row := _scatter(columns, unit)) is not None]
-        days = _days(scatter)
-        out[name] = FeatureSpread(days, _mismatch(columns, units, days.value))
+        days, worth = _days(scatter)
+        daily = (worth + days.value * days.runs) / (worth + days.runs)
+        out[name] = FeatureSpread(days, _mismatch(columns, units, daily), worth)
     return out
 
 
@@ -214,27 +293,29 @@ def _scatter(columns: Iterable[TestResiduals], unit: str) -> tuple[float, float]
         products = (mean.sum() ** 2 - np.sum(mean**2)) / (count * (count - 1.0))
         ratios.append((square.mean() - products) / (c.daily[0] + c.noise[mine, 0].mean()))
         degrees.append(count - 1.0)
-    return (float(np.mean(ratios)), max(degrees)) if ratios else None
+    return (max(float(np.mean(ratios)), 0.0), max(degrees)) if ratios else None
 
 
-def _days(scatter: Sequence[tuple[float, float]]) -> VarianceFactor:
-    """The factor of a step's variance, by what units scatter.
+def _days(scatter: Sequence[tuple[float, float]]) -> tuple[VarianceFactor, float]:
+    """The mean square of steps, and what the stated one is worth beside it.
 
-    Of several units it is worth less for the next one where theirs differ.
+    Where several units differ, both are worth less for the next one.
     """
     total = sum(n for _, n in scatter)
-    value = (DEGREES + sum(n * square for square, n in scatter)) / (DEGREES + total)
-    worth = DEGREES + total
+    if not total:
+        return VarianceFactor(), STATED
+    value = sum(n * square for square, n in scatter) / total
+    share = 1.0
     if len(scatter) > 1:
-        worth = 1.0 / (1.0 / worth + 1.0 / _between(scatter, value))
-    return VarianceFactor(value, max(worth, 1.0))
+        share = 1.0 / (1.0 + (STATED + total) / _between(scatter, max(value, 1e-9)))
+    return VarianceFactor(value, share * total), max(share * STATED, 1.0)
 
 
 def _between(scatter: Sequence[tuple[float, float]], value: float) -> float:
     """Runs that what is known of all units is worth for one: its scatter follows Fisher's law."""
     from scipy.stats import f as fisher
 
-    log = -0.5 * (np.log(_WORTH / DEGREES) / _UNSURE) ** 2
+    log = -0.5 * (np.log(_WORTH / STATED) / _UNSURE) ** 2
     for square, n in scatter:
         log = log + fisher.logpdf(square / value, n, _WORTH)
     weight = np.exp(log - log.max())
@@ -244,19 +325,18 @@ def _between(scatter: Sequence[tuple[float, float]], value: float) -> float:
 def _mismatch(
     columns: Sequence[TestResiduals], units: Sequence[str], daily: float
 ) -> VarianceFactor:
-    """The factor of an offset's variance; tests of one unit share it, so they count once."""
-    log = -(0.5 * DEGREES) * (np.log(_GRID) + 1.0 / _GRID)
+    """The mean square of offsets; tests of one unit share it, so they count once.
+
+    A unit counts by what of its mean's variance is the offset's.
+    """
+    total, runs = 0.0, 0.0
     for unit in units:
         rows = [_centre(c, unit, daily) for c in columns if (c.unit == unit).any()]
-        for centre, of_mean, stated in rows:
-            variance = _GRID * stated + of_mean
-            log = log - 0.5 * (np.log(variance) + centre**2 / variance) / len(rows)
-    # Evenly in the logarithm: the prior's density in it is what stands above.
-    weight = np.exp(log - log.max())
-    weight /= weight.sum()
-    mean = float(np.sum(weight / _GRID))
-    scatter = float(np.sum(weight * (1.0 / _GRID - mean) ** 2))
-    return VarianceFactor(1.0 / mean, 2.0 * mean**2 / scatter)
+        weights = [(stated / (stated + of_mean)) ** 2 for _, of_mean, stated in rows]
+        ratios = [centre**2 / (stated + of_mean) for centre, of_mean, stated in rows]
+        total += float(np.mean(np.multiply(weights, ratios)))
+        runs += float(np.mean(weights))
+    return VarianceFactor(total / runs, runs)
 
 
 def _centre(c: TestResiduals, unit: str, daily: float) -> tuple[float, float, float]:
@@ -266,34 +346,3 @@ def _centre(c: TestResiduals, unit: str, daily: float) -> tuple[float, float, fl
     centre = float(np.mean([c.off[d, 0].mean() for d in days]))
     of_mean = (daily * float(c.daily[0]) + float(c.noise[mine, 0].mean())) / len(days)
     return centre, of_mean, float(c.mismatch[0])
-
-
-def _held_out(
-    test: _Test, residuals: Sequence[TestResiduals], candidates: Sequence[CandidateFault]
-) -> tuple[list[float], list[float]]:
-    """Chance of each log by what the other days say: without a baseline, and with one of theirs."""
-    alone, based, r = [], [], test.residuals
-    known: Mapping[tuple[str, str], LearnedSpread] = {
-        (u, d): LearnedSpread(features=fitted([x.without(u, d) for x in residuals]))
-        for u, d in dict.fromkeys(zip(r.unit.tolist(), r.day.tolist(), strict=True))
-    }
-    for k, (item, model) in enumerate(zip(test.readings, test.models, strict=True)):
-        spread = known[str(r.unit[k]), str(r.day[k])]
-        others = np.flatnonzero((r.unit == r.unit[k]) & (r.day != r.day[k]))
-
-        def chance(
-            baselines: Sequence[FeatureVector],
-            item: Reading = item,
-            model: Replay = model,
-            spread: LearnedSpread = spread,
-        ) -> float:
-            unit = healthy(model, r.names, baselines, spread_known=spread)
-            return chance_of(LogCase("", item.features.only(r.names), unit, model), candidates)
-
-        alone.append(chance([]))
-        if len(others):  # the next day, in turn
-            near = int(others[np.searchsorted(others, k) % len(others)])
-            base = test.readings[near]
-            there = base.features if item.repeats(base) else transferred(base, model)
-            based.append(chance([there]))
-    return alone, based
