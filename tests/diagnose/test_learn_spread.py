@@ -121,7 +121,7 @@ def test_units_that_scatter_alike_are_worth_more_than_units_that_differ():
     assert differ.days.runs + differ.worth < 6.0 < STATED < alike.days.runs + alike.worth
 
 
-def held(count, tests=1):
+def even_rows(count, tests=1):
     """Held-out logs of so many days of each test, their chances even."""
     return tuple(
         HeldOut(test, day, (day + 0.5) / count, (day + 0.5) / count)
@@ -132,7 +132,7 @@ def held(count, tests=1):
 
 def test_a_conformal_threshold_needs_its_days():
     assert (needed(0.05), needed(0.01), needed(0.5)) == (19, 99, 1)
-    few, enough = (LearnedSpread(units=1, days=n, held_out=held(n)) for n in (18, 19))
+    few, enough = (LearnedSpread(units=1, days=n, held_out=even_rows(n)) for n in (18, 19))
     assert few.rank(0.001, 1, 0.05) == 0.0  # it raises no threshold
     assert enough.rank(0.001, 1, 0.05) == pytest.approx(0.05)
     assert enough.rank(0.5 / 19, 0, 0.05) == pytest.approx(0.10)
@@ -145,8 +145,8 @@ def test_a_conformal_threshold_needs_its_days():
 
 def test_days_of_several_tests_are_no_days_of_each():
     """Seven days of three tests are 21 logs and no conformal threshold."""
-    assert not LearnedSpread(units=1, days=21, held_out=held(7, 3)).enough(0.05)
-    assert LearnedSpread(units=1, days=57, held_out=held(19, 3)).enough(0.05)
+    assert not LearnedSpread(units=1, days=21, held_out=even_rows(7, 3)).enough(0.05)
+    assert LearnedSpread(units=1, days=57, held_out=even_rows(19, 3)).enough(0.05)
 
 
 def test_of_a_fleet_units_are_ranked_and_not_days():
@@ -254,7 +254,7 @@ def test_days_that_scatter_more_are_learnt_and_no_longer_called_faulty(tmp_path)
     *days, log = logs
     stated = elevon.diagnose(log, actuator, baselines=days[:1])
     learnt = elevon.learn_spread(days, actuator)
-    assert learnt.shown()["speed_gain"][0] > 2.0
+    assert learnt.deviations()["speed_gain"][0] > 2.0
     answer = elevon.diagnose(
         log, actuator, baselines=days[:1], spread=learnt.save(tmp_path / "spread.toml")
     )
@@ -276,7 +276,7 @@ def test_a_faulty_log_among_the_learnt_is_told_of():
     actuator = Actuator.load("torino-rotary")
     cases = [(220 + k, []) for k in range(4)] + [(224, ["backlash@transmission=0.13 deg"])]
     logs = [replace(x, name=f"day {k}") for k, x in enumerate(bench_logs(actuator, cases))]
-    with pytest.warns(ElevonWarning, match="looks faulty itself") as told:
+    with pytest.warns(ElevonWarning, match="looks faulty itself") as caught:
         elevon.learn_spread(logs, actuator)
-    names = [str(w.message).split(" looks")[0] for w in told if "looks faulty" in str(w.message)]
+    names = [str(w.message).split(" looks")[0] for w in caught if "looks faulty" in str(w.message)]
     assert names == ["day 4"]

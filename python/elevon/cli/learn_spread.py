@@ -51,7 +51,7 @@ def _print(result: LearnedSpread, path: Path) -> None:
     counts = (("day", result.days), ("unit", result.units), ("log", result.logs))
     days, units, logs = (f"{count} {name}{'s' * (count != 1)}" for name, count in counts)
     answer(f"spread learnt: {days} of {units}, {logs} -> {path}")
-    far = sorted(result.shown().items(), key=lambda row: -abs(float(row[1][0]) - 1.0))
+    far = sorted(result.deviations().items(), key=lambda row: -abs(float(row[1][0]) - 1.0))
     rows = [(name, *(f"{x:.2f}" for x in values)) for name, values in far]
     columns = ("feature", "day to day", "low", "high", "mismatch", "low", "high")
     print_table(columns, rows, title="deviations over those stated, with 90 % intervals")

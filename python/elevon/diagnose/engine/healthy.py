@@ -70,10 +70,10 @@ class Healthy:
         step = self.covariance - self.offset
         step = step / np.outer(self.scale, self.scale) + np.diag(noise**2)
         out = _correlated(step, count, (seed, 3)) * np.sqrt(factor)
-        own, _ = self.offsets.drawn(count, _OTHER + seed)
+        factors, _ = self.offsets.drawn(count, _OTHER + seed)
         if not len(self.offsets.common):
-            own = own * common
-        size = np.sqrt(own / self.offsets.value)
+            factors = factors * common
+        size = np.sqrt(factors / self.offsets.value)
         size[:, self.by_days] = np.sqrt(factor[:, self.by_days]) / self.scale[self.by_days]
         out += _correlated(self.offset, count, (seed, 4)) * size
         return out
@@ -133,10 +133,10 @@ def healthy(
         stated_step = np.diag(spread) + noise
         scatter = np.sum((residual - centre) ** 2, axis=0) / stated_step
         shared = _shared(scatter / steps.value, count - 1)
-        told = max(1.0 - 2.0 * shared, 0.0)  # of one day, baselines tell nothing of days
-        scatter *= told / (1.0 - min(shared, 0.5))
+        weight = max(1.0 - 2.0 * shared, 0.0)  # of one day, baselines tell nothing of days
+        scatter *= weight / (1.0 - min(shared, 0.5))
         alone = centre**2 / (np.diag(off) + stated_step / count)
-        steps, offsets = variances(known, scatter, told * (count - 1), alone)
+        steps, offsets = variances(known, scatter, weight * (count - 1), alone)
     scale = steps.value
     spread *= np.sqrt(np.outer(scale, scale))
     off *= np.sqrt(np.outer(offsets.value, offsets.value))

@@ -32,7 +32,7 @@ _FAR = 8.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is
 FORMAT = "elevon-spread"
 _VERSION = 2
 _ENDS = (0.05, 0.95)
-_SHOWN = 4000  # draws of an interval that is printed
+_INTERVAL_DRAWS = 4000  # draws of an interval that is printed
 
 
 class VarianceFactor(NamedTuple):
@@ -124,9 +124,9 @@ class StepVariance:
         alone_free : ndarray, shape (k,), or float
             Its degrees of freedom.
         """
-        log = _told(scatter, free, worth)
+        log = _log_likelihood(scatter, free, worth)
         if alone is not None:
-            log = log + _told(alone, alone_free, np.minimum(worth, _FAR))
+            log = log + _log_likelihood(alone, alone_free, np.minimum(worth, _FAR))
         weight = np.exp(log - log.max())
         return cls(worth, scatter, free, weight / weight.sum())
 
@@ -147,11 +147,11 @@ class StepVariance:
 
     def roots(self) -> Floats:
         """Return the deviations over the stated ones: middle and 90 % interval, shape (3, k)."""
-        factors, _ = self.drawn(_SHOWN, 5)
+        factors, _ = self.drawn(_INTERVAL_DRAWS, 5)
         return np.asarray(np.sqrt(np.quantile(factors, (0.5, *_ENDS), axis=0)), dtype=np.float64)
 
 
-def _told(scatter: Floats, free: Floats | float, tail: Floats) -> Floats:
+def _log_likelihood(scatter: Floats, free: Floats | float, tail: Floats) -> Floats:
     """Log likelihood of each common factor by sums of squares, which follow Fisher's law."""
     from scipy.stats import f as fisher
 
@@ -209,7 +209,7 @@ class LearnedSpread:
         worth, days, runs, mismatch, units = table.reshape(-1, 5).T
         return KnownSpread(worth, days * runs, runs, mismatch * units, units, learnt=True)
 
-    def shown(self) -> dict[str, Floats]:
+    def deviations(self) -> dict[str, Floats]:
         """Return deviations over the stated ones by name, shape (6,).
 
         From day to day, and of the mismatch: middle, ends of its 90 % interval.

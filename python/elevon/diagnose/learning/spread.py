@@ -157,8 +157,8 @@ def _rows(
         # Of several units the whole unit is held out, else the day.
         unit, day = str(r.unit[k]), "" if len(units) > 1 else str(r.day[k])
         if (unit, day) not in known:
-            rest = [x for x in (x.without(unit, day) for x in residuals) if len(x.unit)]
-            known[unit, day] = LearnedSpread(features=fitted(rest))
+            left = [x for x in (x.without(unit, day) for x in residuals) if len(x.unit)]
+            known[unit, day] = LearnedSpread(features=fitted(left))
         spread = known[unit, day]
         others = np.flatnonzero((r.unit == r.unit[k]) & (r.day != r.day[k]))
         near = others[np.searchsorted(others, k) % len(others)] if len(others) else None
@@ -166,7 +166,7 @@ def _rows(
         # The next day, in turn.
         based = 1.0 if near is None else _chance(test, k, [int(near)], spread, candidates)
         if min(alone, based) < SUSPECT:
-            _told(item, _chance(test, k, others.tolist(), spread, candidates))
+            _warn_of(item, _chance(test, k, others.tolist(), spread, candidates))
         group = units.index(unit) if len(units) > 1 else days.index(day)
         yield HeldOut(number, group, alone, based)
 
@@ -188,7 +188,7 @@ def _chance(
     return judged([case], candidates)
 
 
-def _told(item: Reading, chance: float) -> None:
+def _warn_of(item: Reading, chance: float) -> None:
     """Warn of a log that looks faulty beside all the others of its unit."""
     if chance < SUSPECT:
         warnings.warn(
