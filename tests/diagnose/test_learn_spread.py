@@ -16,7 +16,7 @@ from elevon.diagnose.engine.spread import (
     _FACTORS,
     STATED,
     FeatureSpread,
-    HeldOut,
+    HeldOutLog,
     LearnedSpread,
     VarianceFactor,
     needed,
@@ -124,7 +124,7 @@ def test_units_that_scatter_alike_are_worth_more_than_units_that_differ():
 def even_rows(count, tests=1):
     """Held-out logs of so many days of each test, their chances even."""
     return tuple(
-        HeldOut(test, day, (day + 0.5) / count, (day + 0.5) / count)
+        HeldOutLog(test, day, (day + 0.5) / count, (day + 0.5) / count)
         for test in range(tests)
         for day in range(count)
     )
@@ -150,7 +150,7 @@ def test_days_of_several_tests_are_no_days_of_each():
 
 
 def test_of_a_fleet_units_are_ranked_and_not_days():
-    rows = tuple(HeldOut(0, unit, 0.5, 0.5) for unit in range(4) for _ in range(30))
+    rows = tuple(HeldOutLog(0, unit, 0.5, 0.5) for unit in range(4) for _ in range(30))
     fleet_of = LearnedSpread(units=4, days=120, held_out=rows)
     assert not fleet_of.enough(0.05)
     assert "4 healthy units of each test" in fleet_of.threshold_text(0.05)
@@ -166,7 +166,7 @@ def test_the_file_comes_back(tmp_path):
         1,
         3,
         {"a: b": FeatureSpread(VarianceFactor(2.5, 12.0), VarianceFactor(0.3, 1.5), 11.0)},
-        (HeldOut(0, 1, 0.1, 0.2),),
+        (HeldOutLog(0, 1, 0.1, 0.2),),
     )
     assert LearnedSpread.load(learnt.save(tmp_path / "s.toml")) == learnt
     text = (tmp_path / "s.toml").read_text()

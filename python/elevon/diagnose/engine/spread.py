@@ -162,7 +162,7 @@ def _log_likelihood(scatter: Floats, free: Floats | float, tail: Floats) -> Floa
     return np.asarray(each.sum(axis=1), dtype=np.float64)
 
 
-class HeldOut(NamedTuple):
+class HeldOutLog(NamedTuple):
     """A learnt log's chance by what the others say.
 
     Attributes
@@ -191,7 +191,7 @@ class LearnedSpread:
         Learnt from; a unit's days are counted apart from another's.
     features : mapping of str to FeatureSpread
         By name; the stated ones hold where a feature is missing.
-    held_out : tuple of HeldOut
+    held_out : tuple of HeldOutLog
         Every learnt log.
     """
 
@@ -200,7 +200,7 @@ class LearnedSpread:
     units: int = 0
     days: int = 0
     features: Mapping[str, FeatureSpread] = field(default_factory=dict)
-    held_out: tuple[HeldOut, ...] = ()
+    held_out: tuple[HeldOutLog, ...] = ()
 
     def of(self, names: Sequence[str]) -> KnownSpread:
         """Return what is known of features."""
@@ -315,7 +315,7 @@ class LearnedSpread:
             rows = data.pop("features", {})
             features = {name: _row(document, name, row) for name, row in rows.items()}
             held_out = tuple(
-                HeldOut(int(test), int(group), float(alone), float(based))
+                HeldOutLog(int(test), int(group), float(alone), float(based))
                 for test, group, alone, based in data.pop("held_out")
             )
             return cls(features=features, held_out=held_out, **data)

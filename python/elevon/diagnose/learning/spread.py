@@ -27,7 +27,7 @@ from elevon.diagnose.engine.replay import Replay, replay
 from elevon.diagnose.engine.spread import (
     STATED,
     FeatureSpread,
-    HeldOut,
+    HeldOutLog,
     LearnedSpread,
     VarianceFactor,
 )
@@ -147,7 +147,7 @@ def _rows(
     test: _Test,
     residuals: Sequence[TestResiduals],
     candidates: Sequence[CandidateFault],
-) -> Iterator[HeldOut]:
+) -> Iterator[HeldOutLog]:
     """A test's logs, each held out; one that looks faulty is told of."""
     r = test.residuals
     units = list(dict.fromkeys(str(u) for x in residuals for u in x.unit))
@@ -168,7 +168,7 @@ def _rows(
         if min(alone, based) < SUSPECT:
             _warn_of(item, _chance(test, k, others.tolist(), spread, candidates))
         group = units.index(unit) if len(units) > 1 else days.index(day)
-        yield HeldOut(number, group, alone, based)
+        yield HeldOutLog(number, group, alone, based)
 
 
 def _chance(
