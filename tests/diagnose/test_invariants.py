@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elevon.diagnose.by_model import diagnose
+from elevon.diagnose.by_model import diagnose, reading_of
+from elevon.diagnose.engine.candidates import chosen
+from elevon.diagnose.engine.case import case_of, chance_of
 from elevon.errors import InputError
 from studies.fault_limits.standard import Day, day_logs, standard_tests
 from tests.contract import shipped
@@ -67,6 +69,17 @@ def test_the_order_of_logs_changes_nothing(case):
     assert first.status == other.status
     assert first.best == other.best
     assert first.p_fault == pytest.approx(other.p_fault, rel=1e-6)
+
+
+def test_a_second_baseline_of_the_same_day_narrows_nothing(case):
+    """What is as likely of a healthy log beside one is as likely beside both."""
+    actuator, few, logs = case
+    candidates = chosen(few, actuator)
+    item, *days = (reading_of(log, actuator) for log in (logs[0], logs[1], logs[1]))
+    once, twice = (case_of(item, candidates, days[:n]) for n in (1, 2))
+    width, both = (np.diag(c.covariance) for c in (once, twice))
+    assert np.all(both >= 0.999 * width)
+    assert chance_of(twice, candidates) >= 0.9 * chance_of(once, candidates)
 
 
 @pytest.mark.long

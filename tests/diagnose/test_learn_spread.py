@@ -141,6 +141,7 @@ def test_a_conformal_threshold_needs_its_days():
     assert "conformal one at 5 % needs 19" in few.threshold_text(0.05)
     assert "an alarm passes both" in enough.threshold_text(0.05)
     assert "an alarm passes both" not in enough.threshold_text(0.01)
+    assert "an alarm passes both" not in enough.threshold_text(0.05, logs=2)
 
 
 def test_days_of_several_tests_are_no_days_of_each():

@@ -113,13 +113,24 @@ def diagnose(
         )
     result = answer_of(cases, candidates, false_alarm, spread)
     if spread is not None:
-        result = replace(result, findings=(*result.findings, spread.threshold_text(false_alarm)))
+        notes = (*notes, *_of_the_spread(spread, actuator, false_alarm, len(logs)))
     blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
     early = (text for log in logs for text in unsound(log))
     findings = (*early, *result.findings, *notes)
     return replace(
         result, unobservable=blind, findings=findings, seconds=clock.perf_counter() - begin
     )
+
+
+def _of_the_spread(
+    spread: LearnedSpread, actuator: Actuator, rate: float, logs: int
+) -> tuple[str, ...]:
+    """What the threshold stands on, and whether that is another actuator's."""
+    out = (spread.threshold_text(rate, logs),)
+    if spread.actuator in ("", actuator.name):
+        return out
+    return (*out, f"the spread was learnt of {spread.actuator}, this is {actuator.name}: it holds "
+            "as far as they are alike")  # fmt: skip
 
 
 def _broken(

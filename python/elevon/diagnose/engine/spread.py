@@ -246,15 +246,15 @@ class LearnedSpread:
         shares = [[float(np.mean(x)) for (t, _), x in below.items() if t == k] for k in tests]
         return max((1.0 + sum(each)) / (len(each) + 1.0) for each in shares)
 
-    def threshold_text(self, rate: float) -> str:
-        """Say what a threshold stands on."""
+    def threshold_text(self, rate: float, logs: int = 1) -> str:
+        """Say what a threshold stands on; several logs at once have no rank."""
         of = "units" if self.units > 1 else "days"
         how = "by draws of what is not known of the spread"
-        if self.enough(rate):
+        if logs == 1 and self.enough(rate):
             how += ", and conformal: an alarm passes both"
         return (
             f"threshold {how}; {self.groups} healthy {of} of each test were learnt, a conformal "
-            f"one at {100.0 * rate:g} % needs {needed(rate)}"
+            f"one at {100.0 * rate:g} % needs {needed(rate)}{' and one log' * (logs > 1)}"
         )
 
     def to_dict(self) -> dict[str, Any]:
