@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, ReportTable
+from elevon.data import packaged_toml
+from elevon.report import Report
+from elevon.report.described import described
 from elevon.report.figures import COLOURS, new_figure
-from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,63 +30,13 @@ _METHODS = {
 
 def effects_report(effects: Effects, folder: str, *, date: str | None = None) -> Report:
     """Return the report of a campaign's effects on a response."""
-    report = Report(
-        f"Effects on {effects.response}",
-        f"Change of the response [{effects.unit}] from the lowest to the highest level of each "
-        f"factor. Intervals at {100 * effects.level:g} % for each term by itself: "
-        f"{_METHODS[effects.method]}.",
-        date=date,
-    )
-    report.fact("Runs", str(effects.runs), f"{len(effects.left_out)} left out")
-    report.fact("Mean", f"{effects.mean:.4g} {effects.unit}")
-    section = report.section("Effects")
-    section.table(
-        ReportTable(["Term", "Factors", "Effect", "Low", "High", "Aliased with"], _rows(effects))
-    )
-    for text in _confounded(effects):
-        section.text(text)
-    section.figure(pareto(effects), "Pareto chart; the line is the margin of the interval.")
-    section.figure(half_normal(effects), "Half-normal plot; effects of noise alone lie on a line.")
-    factors = []
-    for item in effects.factors:
-        unit = display_unit(item["unit"])
-        ends = [to_display(item[name], unit) for name in ("low", "high")]
-        factors.append([item["letter"], item["name"], *ends, unit])
-    report.section("Factors").table(
-        ReportTable(["Letter", "Factor", "Low", "High", "Unit"], factors)
-    )
+    names = {"effects": effects, "methods": _METHODS, "equal_repeats": EQUAL_REPEATS,
+             "pareto": pareto, "half_normal": half_normal}  # fmt: skip
+    report = described(packaged_toml("elevon.analysis", "effects.toml"), names, date=date)
     report.provenance(
         {"Command": f"elevon campaign effects {folder} --response {effects.response}"}
     )
     return report
-
-
-def _rows(effects: Effects) -> list[list[Any]]:
-    blank = "not known"
-    return [
-        [
-            term.term,
-            term.name,
-            term.effect,
-            blank if term.low is None else term.low,
-            blank if term.high is None else term.high,
-            ", ".join(term.aliases),
-        ]
-        for term in effects.terms
-    ]
-
-
-def _confounded(effects: Effects) -> list[str]:
-    texts = []
-    if effects.blocked:
-        texts.append(f"Confounded with the blocks: {', '.join(effects.blocked)}.")
-    if effects.equal_repeats:
-        texts.append(f"Note: {EQUAL_REPEATS}.")
-    if effects.partial:
-        texts.append(f"Left out, partly aliased with other terms: {', '.join(effects.partial)}.")
-    if effects.with_blocks:
-        texts.append(f"Varied with the blocks: {', '.join(effects.with_blocks)}.")
-    return texts
 
 
 def pareto(effects: Effects, most: int = 25) -> Figure:

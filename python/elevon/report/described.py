@@ -8,10 +8,10 @@ and ``displayed``, the functions ``zip``, ``within``, ``degrees`` and ``display_
 
 A part
     ``section`` or ``heading`` (texts) begins one; ``text`` and ``points`` (lists of texts; points
-    may be an expression), ``figure`` and ``table`` (lists) are added in this order. ``when``:
-    expression, whether it is there. ``each``: expression, or a list; the part is repeated with
-    ``item``, ``index`` and ``last`` (``outer``: the item around it). Figures, tables, axes and
-    calls have both, too.
+    may be an expression), ``figure`` and ``table`` (lists) are added in this order, then the
+    ``part`` within it. ``when``: expression, whether it is there. ``each``: expression, or a list:
+    the part is repeated with ``item``, ``index`` and ``last`` (``outer``: the item around it).
+    Figures, tables, axes and calls have both, too.
 A table
     ``rows``: expression; ``columns``: lists of heading, field of the row or expression of ``row``,
     and the format of its numbers. Rows that are lists of cells: the field is empty. ``caption``,
@@ -61,9 +61,7 @@ def described(
     )
     for fact in description.get("facts", ()):
         report.fact(*(text(item, names) for item in fact))
-    for part in description["part"]:
-        for inside in _repeated(part, names):
-            _add(report, part, inside)
+    _parts(report, description, names)
     return report
 
 
@@ -130,6 +128,12 @@ def _repeated(entry: _Names, names: _Names) -> Iterator[_Names]:
     yield from (place for place in places if _value(entry.get("when", True), place))
 
 
+def _parts(report: Report, entry: _Names, names: _Names) -> None:
+    for part in entry.get("part", ()):
+        for inside in _repeated(part, names):
+            _add(report, part, inside)
+
+
 def _add(report: Report, part: _Names, names: _Names) -> None:
     if "section" in part:
         report.section(text(part["section"], names))
@@ -150,6 +154,7 @@ def _add(report: Report, part: _Names, names: _Names) -> None:
     for table in part.get("table", ()):
         for inside in _repeated(table, names):
             _table(section, table, inside)
+    _parts(report, part, names)
 
 
 def _table(section: Section, entry: _Names, names: _Names) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.data import packaged_toml
 from elevon.recording import Recording
 from elevon.recording.states import code_names
-from elevon.report import Report, ReportTable
+from elevon.report import Report
+from elevon.report.described import described
 from elevon.report.figures import new_figure
 from elevon.reproduce.provenance import provenance
 from elevon.safety.campaign import HazardRow, SafetyResult, per_hour
@@ -29,76 +32,42 @@ def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None 
     date : str, optional
         Printed instead of the day's.
     """
-    report = Report(
-        f"Safety of {actuator.name}",
-        f"{result.runs} situations with up to three failures, {result.repeated} of them again at "
-        f"high fidelity. {result.unsafe} show a hazard.",
-        date=date,
-    )
-    report.fact("Situations", str(result.runs), "at low fidelity")
-    report.fact("With a hazard", str(result.unsafe), "listed or not")
-    single = sum(item.single for item in result.hazards if item.severe)
-    report.fact("Severe by one failure", str(single), "must be none")
-    _hazards(report, result)
-    for item in result.hazards:
-        if item.findings:
-            _worst(report, actuator, item.name, item.findings)
-    groups = [[name, number] for name, number in result.groups.items()]
-    report.section("What was run").table(ReportTable(["Group", "Rows"], groups))
+    names = {
+        "result": result,
+        "actuator": actuator,
+        "texts": {item.name: item.text for item in HAZARDS},
+        "combinations": _combinations,
+        "worst": partial(_worst, actuator),
+    }
+    report = described(packaged_toml("elevon.safety", "page.toml"), names, date=date)
     report.section("Checks").checks(result.checks)
     command = f"elevon safety {actuator.name} --seed {result.seed} --out DIR"
     report.provenance(provenance(command, Seed=result.seed))
     return report
 
 
-def _hazards(report: Report, result: SafetyResult) -> None:
-    texts = {item.name: item.text for item in HAZARDS}
-    rows: list[list[object]] = [
-        [
-            item.name,
-            texts[item.name],
-            len(item.findings),
-            item.listed,
-            item.single,
-            item.per_hour or None,
-        ]
-        for item in result.hazards
-    ]
-    section = report.section("Hazards")
-    section.table(
-        ReportTable(
-            ["Hazard", "What it is", "Rows", "Listed", "By one failure", "Per hour"],
-            rows,
-            "Listed: no sensor could tell, with the reason below. Per hour: the sum over the "
-            "combinations of the products of their failures' rates, an upper bound.",
-            formats=("", "", "", "", "", ".1e"),
-        )
-    )
-
-
-def _worst(report: Report, actuator: Actuator, name: str, findings: tuple[HazardRow, ...]) -> None:
-    """A hazard's combinations, why no sensor could tell, and its worst row over time."""
-    section = report.section(name[0].upper() + name[1:])
+def _combinations(findings: tuple[HazardRow, ...]) -> list[list[object]]:
+    """Return a hazard's combinations: rows, probability an hour, why no sensor could tell."""
     rows = Counter(item.row.combination for item in findings)
     combinations = {item.row.combination: item for item in findings}
-    lines: list[list[object]] = [
+    return [
         [key, rows[key], per_hour(item.row), item.reason or "not listed"]
         for key, item in combinations.items()
     ]
-    section.table(
-        ReportTable(["Failures", "Rows", "Per hour", "Why no sensor could tell"], lines,
-                    formats=("", "", ".1e", ""))
-    )  # fmt: skip
+
+
+def _worst(actuator: Actuator, findings: tuple[HazardRow, ...]) -> dict[str, object]:
+    """Return a hazard's worst row: its timeline, and what the crew sees."""
     unlisted = [item for item in findings if not item.reason]
     chosen = min(unlisted or findings, key=lambda item: len(item.row.faults))
     recording = _again(actuator, chosen)
-    section.figure(
-        _timeline(recording, chosen, actuator.wiring),
-        f"{chosen.row.combination}. {chosen.row.situation}. {chosen.fidelity.capitalize()} "
-        f"fidelity; the hazard begins at the dotted line, {chosen.time:.2f} s.",
-    )
-    section.text("What the crew sees:")
-    section.points(_messages(recording, actuator.wiring))
+    return {
+        "row": chosen.row,
+        "fidelity": chosen.fidelity,
+        "time": chosen.time,
+        "figure": _timeline(recording, chosen, actuator.wiring),
+        "messages": _messages(recording, actuator.wiring),
+    }
 
 
 def _again(actuator: Actuator, finding: HazardRow) -> Recording:

@@ -6,13 +6,13 @@ what it covers, and what each of its checks is held against.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cache
-from importlib.resources import files
 from typing import Any
+
+from elevon.data import packaged_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,18 +118,14 @@ def _command(record: Published) -> str:
 @cache
 def published() -> Mapping[str, Published]:
     """Return the record of each case, by name."""
-    return {name: _record(name, entry) for name, entry in _toml("cases.toml").items()}
+    return {name: _record(name, entry) for name, entry in packaged_toml(__name__, "cases.toml").items()}
 
 
 @cache
 def works() -> tuple[PublishedWork, ...]:
     """Return every work with its tables and figures, each with the cases that cover it."""
     names = ("torino-paper", "torino-bench", "torino-transmission", "nasa", "pisa", "cranfield")
-    return tuple(_work(name, _toml(f"works/{name}.toml")) for name in names)
-
-
-def _toml(name: str) -> dict[str, Any]:
-    return tomllib.loads((files(__package__) / name).read_text("utf-8"))
+    return tuple(_work(name, packaged_toml(__name__, f"works/{name}.toml")) for name in names)
 
 
 def _record(name: str, entry: Mapping[str, Any]) -> Published:

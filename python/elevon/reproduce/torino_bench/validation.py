@@ -254,7 +254,7 @@ def fitted_sine(time: Floats, values: Floats, *, late: float) -> tuple[float, fl
 
 def _waves(time: Floats, frequency: float) -> Floats:
     angle = 2.0 * np.pi * frequency * time
-    return np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
+    return np.asarray(np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)]))
 
 
 def page_values(result: TorinoValidation) -> dict[str, object]:
