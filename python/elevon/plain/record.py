@@ -82,9 +82,19 @@ def plain(value: object, *, stored: bool = True) -> Any:
 
 
 def fields_of(record: object, *names: str, **renamed: str) -> dict[str, Any]:
-    """Return fields of a record as JSON's types, some under another key: ``key=field``."""
-    keys = dict.fromkeys(names) | renamed
-    return {key: plain(getattr(record, field or key)) for key, field in keys.items()}
+    """Return fields of a record as JSON's types, some under another key: ``key=field``.
+
+    A field of a field is named by dots; it is None where there is nothing that could have it.
+    """
+    split = (name.partition("=") for name in names)
+    keys = {key: path or key for key, _, path in split} | renamed
+    return {key: plain(reduce(_field, path.split("."), record)) for key, path in keys.items()}
+
+
+def _field(record: Any, name: str) -> Any:
+    if record is None:
+        return None
+    return record[name] if isinstance(record, Mapping) else getattr(record, name)
 
 
 def _as_table(value: Any, stored: bool) -> Mapping[Any, Any] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from elevon.plain import Plain
 
@@ -62,6 +62,14 @@ def verdict(checks: Sequence[Check]) -> dict[str, object]:
         "status": "pass" if all_passed(checks) else "fail",
         "checks": [check.to_dict() for check in checks],
     }
+
+
+class Checked(Protocol):
+    """What has checks."""
+
+    @property
+    def checks(self) -> Sequence[Check]:
+        """What it is held to."""
 
 
 class CheckedResult(Plain):

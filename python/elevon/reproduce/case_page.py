@@ -11,12 +11,12 @@ from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from elevon.report import Report
-    from elevon.report.checks import CheckedResult
+    from elevon.report.checks import Checked
 
 
 def case_page(
     name: str,
-    result: CheckedResult,
+    result: Checked,
     *,
     date: str | None = None,
     options: Mapping[str, object] | None = None,
@@ -27,7 +27,7 @@ def case_page(
     ----------
     name : str
         Of the case.
-    result : CheckedResult
+    result : Checked
         What it found.
     date : str, optional
         Printed on the page.

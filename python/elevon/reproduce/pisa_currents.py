@@ -115,9 +115,8 @@ def _run(
     seed: int,
     progress: Progress | None,
 ) -> Recording:
-    from elevon.errors import SimulationError
     from elevon.scenario import Scenario
-    from elevon.simulate import simulate
+    from elevon.simulate import completed, simulate
 
     action, duration, start = stroke
     data: dict[str, Any] = {
@@ -128,9 +127,7 @@ def _run(
         data["initial"] = {"nut_position": start}
     run = simulate(gear, Scenario.from_dict(data), fidelity="high", record=record, seed=seed,
                    progress=progress)  # fmt: skip
-    if run.status != "ok":
-        raise SimulationError(f"{action}: {run.meta['message']}", run.status)
-    return run
+    return completed([run], action)[0]
 
 
 def electrical(run: Recording, poles: float) -> tuple[Floats, npt.NDArray[np.int64], Floats]:

@@ -16,7 +16,6 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.errors import SimulationError
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
@@ -172,7 +171,7 @@ def _run_rig(
     progress: Progress | None,
 ) -> list[Recording]:
     from elevon.scenario import Scenario
-    from elevon.simulate import Run, simulate_batch
+    from elevon.simulate import Run, completed, simulate_batch
 
     runs = []
     for number, test in enumerate(tests):
@@ -199,10 +198,7 @@ def _run_rig(
         record="nut_position,load_cell,output_speed,motor_speed@500 Hz",
         progress=progress,
     )
-    for log in logs:
-        if log.status != "ok":
-            raise SimulationError(f"{log.meta['label']}: {log.meta['message']}", log.status)
-    return logs
+    return completed(logs)
 
 
 def _settled(log: Recording, lead: float) -> tuple[Floats, Floats]:

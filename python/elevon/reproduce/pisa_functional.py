@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.plain import fields_of
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.recording.states import code_names
@@ -58,22 +59,14 @@ class FunctionalRow:
 
     def to_dict(self) -> dict[str, object]:
         """Return one row of the command's JSON object."""
-        return {
-            "condition": self.condition.name,
-            "nz": self.condition.load_factor,
-            "supply_v": self.condition.supply,
-            "temperature_k": self.condition.temperature,
-            "extension_s": self.extension_s,
-            "retraction_s": self.retraction_s,
-            "cycle_s": self.cycle_s,
-            "peak_current_a": self.peak_current_a,
-            "peak_speed_rad_s": self.peak_speed_rad_s,
-            "requirement_s": self.condition.requirement,
-            "extension_profile_s": self.profile_s["extension"],
-            "retraction_profile_s": self.profile_s["retraction"],
-            **{f"{name}_rad_s": value for name, value in self.speeds_rad_s.items()},
-            "passed": self.passed,
-        }
+        return fields_of(
+            self, "condition=condition.name", "nz=condition.load_factor",
+            "supply_v=condition.supply", "temperature_k=condition.temperature", "extension_s",
+            "retraction_s", "cycle_s", "peak_current_a", "peak_speed_rad_s",
+            "requirement_s=condition.requirement", "extension_profile_s=profile_s.extension",
+            "retraction_profile_s=profile_s.retraction",
+            *(f"{name}_rad_s=speeds_rad_s.{name}" for name in self.speeds_rad_s), "passed",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

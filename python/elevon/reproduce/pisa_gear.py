@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from elevon.errors import SimulationError
 from elevon.progress import Progress
 from elevon.recording import Recording
 
@@ -112,7 +111,7 @@ def run_strokes(
         A run tripped or diverged.
     """
     from elevon.actuator import Actuator
-    from elevon.simulate import Run, simulate_batch
+    from elevon.simulate import Run, completed, simulate_batch
 
     actuator = Actuator.load(ACTUATOR)
     runs = [
@@ -120,12 +119,7 @@ def run_strokes(
         for number, stroke in enumerate(strokes)
     ]
     recordings = simulate_batch(runs, fidelity=fidelity, record=RECORD, progress=progress)
-    for recording in recordings:
-        if recording.status != "ok":
-            raise SimulationError(
-                f"{recording.meta['label']}: {recording.meta['message']}", recording.status
-            )
-    return recordings
+    return completed(recordings)
 
 
 def stroke_time(recording: Recording, action: str) -> float:

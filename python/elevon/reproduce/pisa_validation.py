@@ -270,7 +270,7 @@ def _log(
     from elevon.bench.procedure import Procedure
     from elevon.bench.stand import stand_of
     from elevon.documents import Document, validated
-    from elevon.errors import SimulationError
+    from elevon.simulate import completed
 
     stroke = unit.parameters.value("lever.stroke")
     positions = np.linspace(0.0, stroke, 9).tolist()
@@ -292,6 +292,5 @@ def _log(
     procedure = validated(Procedure, data, Document("pisa-validation", "", {}))
     (setup,) = loaded_setups(procedure, unit, stand_of(unit.wiring), seed=seed)
     log, run = run_loaded(setup, fidelity, progress)
-    if run.status != "ok":
-        raise SimulationError(f"{action}, {condition.name}: {run.meta['message']}", run.status)
+    completed([run], f"{action}, {condition.name}")
     return log

@@ -16,7 +16,7 @@ from elevon.arrays import Floats
 from elevon.data import read_table
 from elevon.errors import InputError
 from elevon.faults import FaultRecord, catalogue
-from elevon.plain import key
+from elevon.plain import fields_of, key
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.report import Check
@@ -85,16 +85,9 @@ class Signature:
 
     def to_dict(self) -> dict[str, object]:
         """Return the row."""
-        return {
-            "actuator": self.actuator,
-            "kind": self.kind,
-            "place": self.place,
-            "severity": self.severity,
-            "unit": self.unit,
-            "status": self.status,
-            "signal": self.signal,
-            **{f"change_{name}": self.changes.get(name) for name in _SIGNALS},
-        }
+        names = ("actuator", "kind", "place", "severity", "unit", "status", "signal")
+        changes = {f"change_{name}": self.changes.get(name) for name in _SIGNALS}
+        return fields_of(self, *names) | changes
 
 
 @dataclass(frozen=True)

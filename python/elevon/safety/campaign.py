@@ -11,7 +11,7 @@ from typing import Annotated
 from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
 from elevon.faults.catalogue import find_record
-from elevon.plain import WORKING, Plain, key
+from elevon.plain import WORKING, Plain, fields_of, key
 from elevon.progress import Progress
 from elevon.report.checks import Check, CheckedResult
 from elevon.safety.hazards import HAZARDS, RECORD, observe
@@ -50,14 +50,8 @@ class HazardRow:
 
     def to_dict(self) -> dict[str, object]:
         """Return the row of the JSON object."""
-        return {
-            "hazard": self.hazard,
-            "combination": self.row.combination,
-            "situation": self.row.situation,
-            "time": self.time,
-            "fidelity": self.fidelity,
-            "reason": self.reason,
-        }
+        return fields_of(self, "hazard", "combination=row.combination", "situation=row.situation",
+                         "time", "fidelity", "reason")  # fmt: skip
 
 
 @dataclass(frozen=True)

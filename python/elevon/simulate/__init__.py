@@ -1,6 +1,6 @@
 """Simulate one run, or many of them in SIMD batches and threads, on the Rust core."""
 
-from elevon.simulate.batch import batch_bytes, simulate, simulate_batch
+from elevon.simulate.batch import batch_bytes, completed, simulate, simulate_batch
 from elevon.simulate.prepare import Run, check_fidelity, solver_step
 from elevon.simulate.sensitivity import Sensitivities, sensitivities
 
@@ -9,6 +9,7 @@ __all__ = [
     "Sensitivities",
     "batch_bytes",
     "check_fidelity",
+    "completed",
     "sensitivities",
     "simulate",
     "simulate_batch",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrupted
+from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrupted, SimulationError
 from elevon.faults import Fault
 from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
@@ -294,3 +294,26 @@ def _run_core(
     if stopped is not None:
         raise Interrupted(f"interrupted at {stopped['time']:.6g} s of simulated time")
     return results
+
+
+def completed(recordings: Iterable[Recording], what: str = "") -> list[Recording]:
+    """Return runs that all reached their end.
+
+    Parameters
+    ----------
+    recordings : iterable of Recording
+        The runs.
+    what : str
+        Named in the error; empty: each run's label.
+
+    Raises
+    ------
+    SimulationError
+        A run did not reach its end.
+    """
+    whole = []
+    for run in recordings:
+        if run.status != "ok":
+            raise SimulationError(f"{what or run.meta['label']}: {run.meta['message']}", run.status)
+        whole.append(run)
+    return whole

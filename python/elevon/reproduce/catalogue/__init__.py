@@ -118,7 +118,9 @@ def _command(record: Published) -> str:
 @cache
 def published() -> Mapping[str, Published]:
     """Return the record of each case, by name."""
-    return {name: _record(name, entry) for name, entry in packaged_toml(__name__, "cases.toml").items()}
+    return {
+        name: _record(name, entry) for name, entry in packaged_toml(__name__, "cases.toml").items()
+    }
 
 
 @cache

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from elevon.calibrate.slips import Slip, WeightDrop, find_slips, printed_drops
+from elevon.plain import fields_of
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.compliance.fit import (
     Array,
@@ -30,6 +31,11 @@ STANDARD_GRAVITY_FACTOR = 0.980665
 PUBLISHED_N_PER_DEG = 68.23
 SLIPS_BY_HAND = frozenset({1, 3, 10, 14, 28, 29})
 """Rows found wrong in a number or a sign when the table was read by eye."""
+
+_VARIANT = ("name", "rows", "load_on_loss_n_per_deg=load_on_loss",
+            "loss_on_load_n_per_deg=loss_on_load", "theil_sen_n_per_deg=theil_sen",
+            "r2")  # fmt: skip
+_REPAIRED = tuple(f"{name}_repaired_deg={name}_deg" for name in ("motor", "encoder", "loss"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,9 +98,13 @@ class ComplianceResult:
             "deming_n_per_deg": self.deming,
             "robust_on_printed_rows_n_per_deg": self.robust_printed.stiffness,
             "curvature_p_value": self.curvature_p,
-            "variants": [_variant_dict(variant) for variant in self.variants],
-            "slips": [{"row": s.row, "kind": s.kind, "reason": s.reason} for s in self.slips],
-            "rows": [_row(a, b) for a, b in zip(self.printed, self.repaired, strict=True)],
+            "variants": [fields_of(v, *_VARIANT) for v in self.variants],
+            "slips": [fields_of(slip, "row", "kind", "reason") for slip in self.slips],
+            "rows": [
+                fields_of(a, "row", "load_n", "motor_deg", "encoder_deg", "loss_deg")
+                | fields_of(b, *_REPAIRED)
+                for a, b in zip(self.printed, self.repaired, strict=True)
+            ],
         }
 
 
@@ -208,30 +218,6 @@ def _columns(drops: Sequence[WeightDrop]) -> tuple[Array, Array]:
         np.array([drop.load_n for drop in drops]),
         np.array([drop.loss_deg for drop in drops]),
     )
-
-
-def _variant_dict(variant: AngleColumns) -> dict[str, Any]:
-    return {
-        "name": variant.name,
-        "rows": variant.rows,
-        "load_on_loss_n_per_deg": variant.load_on_loss,
-        "loss_on_load_n_per_deg": variant.loss_on_load,
-        "theil_sen_n_per_deg": variant.theil_sen,
-        "r2": variant.r2,
-    }
-
-
-def _row(printed: WeightDrop, repaired: WeightDrop) -> dict[str, Any]:
-    return {
-        "row": printed.row,
-        "load_n": printed.load_n,
-        "motor_deg": printed.motor_deg,
-        "encoder_deg": printed.encoder_deg,
-        "loss_deg": printed.loss_deg,
-        "motor_repaired_deg": repaired.motor_deg,
-        "encoder_repaired_deg": repaired.encoder_deg,
-        "loss_repaired_deg": repaired.loss_deg,
-    }
 
 
 def page_values(result: ComplianceResult) -> dict[str, object]:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.errors import RangeError, SimulationError
+from elevon.errors import RangeError
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.report.checks import Check
@@ -36,7 +36,7 @@ from elevon.reproduce.nasa.histories import time_histories
 from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, MotionProfile, profile_scenario
 from elevon.reproduce.nasa.store import CellStore, work_key
-from elevon.simulate import Run, simulate_batch
+from elevon.simulate import Run, completed, simulate_batch
 
 Array = npt.NDArray[np.float64]
 Case = tuple[MotionProfile, float]
@@ -228,7 +228,7 @@ def _measure(
             chosen = [runs[place] for place in group]
             recordings = simulate_batch(chosen, fidelity="high", record=RECORD, progress=span)
             periods = [cells[place[1]][0].period for place in group]
-            values = np.array(list(map(_measures, recordings, periods)))
+            values = np.array(list(map(_measures, completed(recordings), periods)))
             store.put(f"group {number}", values)
         done += spent
         measured |= {place: tuple(v) for place, v in zip(group, values.tolist(), strict=True)}
@@ -237,8 +237,6 @@ def _measure(
 
 def _measures(recording: Recording, period: float) -> list[float]:
     label, meta = recording.meta["label"], recording.meta
-    if recording.status != "ok":
-        raise SimulationError(f"{label}: {meta['message']}", recording.status)
     time = recording["command"].time
     late = time >= SETTLE
     if math.isfinite(period) and time[-1] >= SETTLE + period:

@@ -7,7 +7,6 @@ from itertools import product
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.errors import SimulationError
 from elevon.progress import Progress
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
@@ -26,7 +25,7 @@ def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[di
         A run did not reach its end.
     """
     from elevon.scenario import Scenario
-    from elevon.simulate import Run, simulate_batch
+    from elevon.simulate import Run, completed, simulate_batch
 
     cases = list(product(("trapezoidal", "triangular"), (0.0, 8500.0), (0.0, ACCELERATION)))
     runs = [
@@ -42,9 +41,7 @@ def corner_rows(actuator: Actuator, progress: Progress | None = None) -> list[di
     record = "command,output_position,current_ref@2 kHz"
     rows = []
     recordings = simulate_batch(runs, fidelity="high", record=record, progress=progress)
-    for (shape, load, acceleration), recording in zip(cases, recordings, strict=True):
-        if recording.status != "ok":
-            raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
+    for (shape, load, acceleration), recording in zip(cases, completed(recordings), strict=True):
         late = recording["command"].time >= SETTLE
         current = recording["current_ref"].values[late]
         error = (recording["command"].values - recording["output_position"].values)[late]

@@ -226,7 +226,7 @@ def _log(
     from elevon.bench.procedure import Procedure
     from elevon.bench.stand import stand_of
     from elevon.documents import Document, validated
-    from elevon.errors import SimulationError
+    from elevon.simulate import completed
 
     state, profile, force = experiment
     trace = {"kind": "trace", "name": "run", "duration": SECONDS,
@@ -236,8 +236,7 @@ def _log(
     faults = [JAM] if state == "jam" else []
     (setup,) = loaded_setups(procedure, unit, stand_of(unit.wiring), faults=faults, seed=seed)
     log, run = run_loaded(setup, fidelity, progress)
-    if run.status != "ok":
-        raise SimulationError(f"{state}, {profile}: {run.meta['message']}", run.status)
+    completed([run], f"{state}, {profile}")
     return log
 
 

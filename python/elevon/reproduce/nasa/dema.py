@@ -12,13 +12,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.errors import SimulationError
+from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
@@ -55,26 +55,24 @@ RECORD = "surface_temperature,nut_temperature,winding_temperature@1 Hz"
 
 
 @dataclass(frozen=True, slots=True)
-class FitRow:
+class FitRow(Plain):
     """A hidden value and what the fit recovered, SI; the interval is that of surface and nut alone.
 
     What the air's thermocouple adds is not in it.
     """
 
+    COMPUTED = ("interval",)
+
     parameter: str
     put_in: float
     recovered: float
-    low: float
-    high: float
+    low: Annotated[float, WORKING]
+    high: Annotated[float, WORKING]
 
-    def to_dict(self) -> dict[str, object]:
-        """Return one row of the command's JSON object."""
-        return {
-            "parameter": self.parameter,
-            "put_in": self.put_in,
-            "recovered": self.recovered,
-            "interval": [self.low, self.high],
-        }
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Both ends."""
+        return self.low, self.high
 
 
 @dataclass(frozen=True)
@@ -171,7 +169,7 @@ def _hours(
     `air` has instants [s] and temperatures [K]; of a single instant the air stays.
     """
     from elevon.scenario import Scenario
-    from elevon.simulate import Run, simulate_batch
+    from elevon.simulate import Run, completed, simulate_batch
 
     data = profile_scenario(MotionProfile("sinusoidal", 0.05, 0.06, HOUR))
     steps = [
@@ -187,11 +185,9 @@ def _hours(
     scenario = Scenario.from_dict(data)
     runs = [Run(nominal.with_values(_named(v)), scenario, label="thermal hour") for v in values]
     recordings = simulate_batch(runs, fidelity="low", record=RECORD, progress=progress)
-    for recording in recordings:
-        if recording.status != "ok":
-            raise SimulationError(f"thermal hour: {recording.meta['message']}", recording.status)
     return [
-        np.stack([recording[name].values for name in recording.names]) for recording in recordings
+        np.stack([recording[name].values for name in recording.names])
+        for recording in completed(recordings, "thermal hour")
     ]
 
 

@@ -33,6 +33,11 @@ class Effect:
     high: float
 
     @property
+    def interval(self) -> tuple[float, float]:
+        """Both ends."""
+        return self.low, self.high
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Interval of the distance whatever its sign."""
         ends = sorted((abs(self.low), abs(self.high)))

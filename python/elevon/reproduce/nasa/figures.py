@@ -124,15 +124,10 @@ def reproduce_faults(*, seed: int = 0, progress: Progress | None = None) -> Faul
 
 
 def _simulated(runs: Sequence[Any], record: str, progress: Progress | None) -> list[Recording]:
-    from elevon.errors import SimulationError
-    from elevon.simulate import simulate_batch
+    from elevon.simulate import completed, simulate_batch
 
     recordings = simulate_batch(runs, fidelity="high", record=record, progress=progress)
-    for recording in recordings:
-        if recording.status != "ok":
-            meta = recording.meta
-            raise SimulationError(f"{meta['label']}: {meta['message']}", recording.status)
-    return recordings
+    return completed(recordings)
 
 
 def _figures(actuator: Actuator, seed: int, progress: Progress | None) -> list[FaultFigure]:

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.errors import SimulationError
 from elevon.progress import Progress
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.units import to_si
@@ -68,7 +67,7 @@ def time_histories(actuator: Actuator, progress: Progress | None = None) -> list
         A run did not reach its end.
     """
     from elevon.scenario import Scenario
-    from elevon.simulate import Run, simulate_batch
+    from elevon.simulate import Run, completed, simulate_batch
 
     wanted = _conditions()
     runs = [
@@ -76,11 +75,8 @@ def time_histories(actuator: Actuator, progress: Progress | None = None) -> list
         for number, _, data in wanted
     ]
     recordings = simulate_batch(runs, fidelity="high", record=RECORD, progress=progress)
-    for recording in recordings:
-        if recording.status != "ok":
-            raise SimulationError(f"{recording.meta['label']}: {recording.meta['message']}")
     return [
         HistoryFigure(number, title, recording["command"].time,
                 {name: recording[name].values for name in recording.names})
-        for (number, title, _), recording in zip(wanted, recordings, strict=True)
+        for (number, title, _), recording in zip(wanted, completed(recordings), strict=True)
     ]  # fmt: skip

@@ -34,7 +34,7 @@ from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
 from elevon.reproduce.nasa.store import CellStore, work_key
-from elevon.simulate import Run, simulate_batch
+from elevon.simulate import Run, completed, simulate_batch
 
 Array = npt.NDArray[np.float64]
 
@@ -191,8 +191,6 @@ def _simulated(
     runs: Sequence[Run], name: str, store: CellStore, progress: Progress | None
 ) -> Array:
     """Features of all runs, a few at a time to bound the memory of their recordings."""
-    from elevon.errors import SimulationError
-
     chunks = []
     for start in range(0, len(runs), CHUNK):
         values = store.get(f"{name} {start}")
@@ -201,11 +199,7 @@ def _simulated(
             recordings = simulate_batch(
                 runs[start : start + CHUNK], fidelity="high", record=RECORD, progress=span
             )
-            for recording in recordings:
-                if recording.status != "ok":
-                    meta = recording.meta
-                    raise SimulationError(f"{meta['label']}: {meta['message']}", recording.status)
-            values = np.array([features(recording) for recording in recordings])
+            values = np.array([features(recording) for recording in completed(recordings)])
             store.put(f"{name} {start}", values)
         chunks.append(values)
     return np.concatenate(chunks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from elevon.plain import REMAINDER, WORKING
+from elevon.plain import REMAINDER, WORKING, fields_of
 from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.nasa.effect import Effect
 from elevon.reproduce.nasa.impact import Impact, ImpactTrace
@@ -66,21 +66,11 @@ class SeparationRow:
 
     def to_dict(self) -> dict[str, object]:
         """Return one row of the command's JSON object."""
-        return {
-            "fault": self.fault,
-            "profile": self.profile,
-            "load_n": self.load,
-            "feature": self.feature,
-            "unit": self.unit,
-            "healthy": self.healthy,
-            "faulty": self.faulty,
-            "effect_size": self.effect.size,
-            "interval": [self.effect.low, self.effect.high],
-            "half_severity": None if self.half is None else self.half.size,
-            "winner": self.winner,
-            "power": self.power,
-            "draws_needed": self.draws,
-        }
+        return fields_of(
+            self, "fault", "profile", "load_n=load", "feature", "unit", "healthy", "faulty",
+            "effect_size=effect.size", "interval=effect.interval", "half_severity=half.size",
+            "winner", "power", "draws_needed=draws",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

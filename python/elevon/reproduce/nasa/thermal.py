@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
-from elevon.errors import SimulationError
 from elevon.parameters.relations import copper_loss
 from elevon.progress import Progress, part
 from elevon.recording import Recording
@@ -190,15 +189,13 @@ def _simulate(
     actuator: Actuator, data: dict[str, Any], rate: str, seed: int, progress: Progress | None
 ) -> Recording:
     from elevon.scenario import Scenario
-    from elevon.simulate import simulate
+    from elevon.simulate import completed, simulate
 
     recording = simulate(
         actuator, Scenario.from_dict(data), fidelity="low", record=RECORD + rate, seed=seed,
         progress=progress,
     )  # fmt: skip
-    if recording.status != "ok":
-        raise SimulationError(f"thermal run: {recording.meta['message']}", recording.status)
-    return recording
+    return completed([recording], "thermal run")[0]
 
 
 def _hour(actuator: Actuator, seed: int, progress: Progress | None) -> Recording:

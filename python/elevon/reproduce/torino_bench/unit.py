@@ -8,7 +8,6 @@ from typing import Any
 from elevon.actuator import Actuator
 from elevon.bench.procedure import Procedure
 from elevon.documents import Document, validated
-from elevon.errors import SimulationError
 from elevon.logs.log import Log
 from elevon.progress import Progress, part
 
@@ -87,13 +86,10 @@ def bench_logs(
     from elevon.bench.traces import recorded
     from elevon.bench.virtual import traced
     from elevon.scenario.compile import signal_records
-    from elevon.simulate import Run, simulate_batch
+    from elevon.simulate import Run, completed, simulate_batch
 
     ready = setups(procedure, unit, seed=seed)
     runs = [Run(s.actuator, s.scenario, s.conditions.seed, s.trace.name) for s in ready]
     record = recorded(list(signal_records(unit.wiring, fidelity)))
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
-    for run in recordings:
-        if run.status != "ok":
-            raise SimulationError(f"{run.meta['label']}: {run.meta['message']}", run.status)
-    return [traced(setup, run) for setup, run in zip(ready, recordings, strict=True)]
+    return [traced(setup, run) for setup, run in zip(ready, completed(recordings), strict=True)]
