@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -240,7 +240,7 @@ def fitted_sine(time: Floats, values: Floats, *, late: float) -> tuple[float, fl
     instants, signal = time[used], values[used]
 
     def fit(frequency: float) -> tuple[float, Floats]:
-        design = _waves(instants, frequency)
+        design: Any = _waves(instants, frequency)
         weights = np.linalg.lstsq(design, signal, rcond=None)[0]
         return float(np.mean((design @ weights - signal) ** 2)), weights
 
