@@ -130,17 +130,7 @@ def study(
     count = len(high.values)
     withheld = max(round(_HELD_OUT * count), 1)
     budget = (count - withheld) // 2 if budget is None else budget
-    least = 2 * (high.points.shape[1] + 1)
-    if count - withheld < least:
-        raise InputError(
-            f"{count} points are too few, {withheld} of them held out: "
-            f"{high.points.shape[1]} varied quantities need at least {least} to learn from"
-        )
-    if not least <= budget <= count - withheld:
-        raise InputError(
-            f"budget = {budget} high runs of {count} points, {withheld} of them held out: give "
-            f"{least} to {count - withheld}"
-        )
+    _check_budget(high, withheld, budget)
     generator = np.random.default_rng(seed)
     errors: dict[str, list[float]] = {}
     runs: dict[str, tuple[int, int]] = {}
@@ -151,23 +141,28 @@ def study(
             errors.setdefault(name, []).append(_error(model, high, order[:withheld]))
         if progress is not None and progress((split + 1) / splits) is False:
             raise Interrupted(f"interrupted after {split + 1} of {splits} splits")
-    variants = [_variant(name, *runs[name], errors[name]) for name in errors]
-    gain = None
+    gain: tuple[float | None, tuple[float, float] | None] = (None, None)
     if "cokriging" in errors:
         gain = _interval(np.subtract(errors["kriging"], errors["cokriging"]))
-    return Study(
-        response=response,
-        unit=unit,
-        points=count,
-        held_out=withheld,
-        splits=splits,
-        budget=budget,
-        cost_ratio=None if pairs is None else cost_ratio,
-        correlation=None if pairs is None else pairs.correlation,
-        variants=variants,
-        gain=None if gain is None else gain[0],
-        gain_interval=None if gain is None else gain[1],
-    )
+    variants = [SurrogateScore(name, *runs[name], them, *_interval(np.array(them)))
+                for name, them in errors.items()]  # fmt: skip
+    known = (None, None) if pairs is None else (cost_ratio, pairs.correlation)
+    return Study(response, unit, count, withheld, splits, budget, *known, variants, *gain)
+
+
+def _check_budget(high: Samples, withheld: int, budget: int) -> None:
+    count, quantities = len(high.values), high.points.shape[1]
+    least = 2 * (quantities + 1)
+    if count - withheld < least:
+        raise InputError(
+            f"{count} points are too few, {withheld} of them held out: {quantities} varied "
+            f"quantities need at least {least} to learn from"
+        )
+    if not least <= budget <= count - withheld:
+        raise InputError(
+            f"budget = {budget} high runs of {count} points, {withheld} of them held out: give "
+            f"{least} to {count - withheld}"
+        )
 
 
 @dataclass(frozen=True)
@@ -232,10 +227,6 @@ def _error(model: Interpolator, high: Samples, withheld: npt.NDArray[np.int64]) 
     mean, _ = model.predict(high.points[withheld])
     spread = float(high.values.std())
     return float(np.sqrt(np.mean((mean - high.values[withheld]) ** 2)) / spread)
-
-
-def _variant(name: str, high: int, low: int, errors: list[float]) -> SurrogateScore:
-    return SurrogateScore(name, high, low, errors, *_interval(np.array(errors)))
 
 
 def _interval(values: Floats) -> tuple[float, tuple[float, float]]:

@@ -64,7 +64,7 @@ def verdict(checks: Sequence[Check]) -> dict[str, object]:
     }
 
 
-class Checked(Protocol):
+class WithChecks(Protocol):
     """What has checks."""
 
     @property

@@ -97,10 +97,8 @@ def chart(
         instants, values = _interrupted(instants, values, breaks)
     selected, drawn = thinned(instants, values)
     if selected.size < instants.size:
-        note = f"{note} " if note else ""
-        note += (
-            f"{instants.size} samples drawn as the extremes of {selected.size // 2} time slices."
-        )
+        drawn_as = f"drawn as the extremes of {selected.size // 2} time slices."
+        note = f"{note} {instants.size} samples {drawn_as}".lstrip()
     series = with_times_once([
         _line(name, line, selected, COLOURS[k % len(COLOURS)], dashed=name in dashed)
         for k, (name, line) in enumerate(drawn.items())

@@ -11,12 +11,12 @@ from elevon.reproduce.provenance import closed
 
 if TYPE_CHECKING:
     from elevon.report import Report
-    from elevon.report.checks import Checked
+    from elevon.report.checks import WithChecks
 
 
 def case_page(
     name: str,
-    result: Checked,
+    result: WithChecks,
     *,
     date: str | None = None,
     options: Mapping[str, object] | None = None,
@@ -27,7 +27,7 @@ def case_page(
     ----------
     name : str
         Of the case.
-    result : Checked
+    result : WithChecks
         What it found.
     date : str, optional
         Printed on the page.

@@ -19,7 +19,7 @@ from elevon.reproduce.catalogue import Published, published
 
 if TYPE_CHECKING:
     from elevon.report import Report
-    from elevon.report.checks import Checked
+    from elevon.report.checks import WithChecks
 
 Options = Mapping[str, Any]
 Values = dict[str, Any]
@@ -100,7 +100,7 @@ class PublishedCase:
         """Return its options as they are when none is given."""
         return {name: default for name, (_, default) in self.signature().items()}
 
-    def report(self, result: Checked, options: Options) -> Report:
+    def report(self, result: WithChecks, options: Options) -> Report:
         """Return the page of a result."""
         if self.page != "described":
             return cast("Report", self.call(self.page, result, **options))

@@ -9,7 +9,7 @@ while the laboratory warms up. The effects of the factors come from the two-leve
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ from elevon.reproduce.nasa.design import (
 from elevon.reproduce.nasa.histories import time_histories
 from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, MotionProfile, profile_scenario
-from elevon.reproduce.nasa.store import CellStore, work_key
+from elevon.reproduce.nasa.store import CellStore, made_of, work_key
 from elevon.simulate import Run, completed, simulate_batch
 
 Array = npt.NDArray[np.float64]
@@ -121,41 +121,32 @@ def reproduce_baseline(
     """
     actuator = actuator or Actuator.load(ACTUATOR)
     able = Capability.of(actuator)
-    cells = list(baseline_matrix() if cases is None else cases)
-    if load_kind == "spring":
-        cells = [(p, load) for p, load in cells if p.amplitude > 0.0 and load >= 0.0]
+    cells = [
+        (profile, load)
+        for profile, load in (baseline_matrix() if cases is None else cases)
+        if load_kind != "spring" or (profile.amplitude > 0.0 and load >= 0.0)
+    ]
     refusals = [able.refusal(profile, load) for profile, load in cells]
     orders = shuffled_blocks(len(cells), replicates, seed)
     runs = _runs(actuator, cells, orders, load_kind, seed)
-    meta = _provenance(actuator)
+    meta = made_of(actuator)
     key = work_key(kind=load_kind, cells=len(cells), whole=cases is None, replicates=replicates,
                    seed=seed, **meta)  # fmt: skip
     able_runs = {place: run for place, run in runs.items() if refusals[place[1]] is None}
     whole = cases is None and load_kind == "constant"
     span = part(progress, 0.0, 0.9 if whole else 1.0)
     measured = _measure(able_runs, cells, CellStore(folder, key), span)
-    rows = [
-        _row(profile, load, refusals[i], [measured[b, i] for b in range(replicates)
-                                          if (b, i) in measured], able)
-        for i, (profile, load) in enumerate(cells)
-    ]  # fmt: skip
-    effects: dict[str, list[FactorEffect]] = {}
-    checks = _checks(rows, actuator)
-    if whole:
-        effects, effect_checks = _effects(rows, replicates, seed)
-        checks += [*_order_checks(rows), *effect_checks]
+    rows = _rows(cells, refusals, measured, able)
+    checks, sheet = _checks(rows, actuator), _sheet(cells, orders)
+    if not whole:
+        return BaselineResult(rows, checks, load_kind, seed, replicates, sheet=sheet, meta=meta)
+    effects, effect_checks = _effects(rows, replicates, seed)
+    checks += [*_order_checks(rows), *effect_checks]
     return BaselineResult(
-        rows, checks, load_kind, seed, replicates, effects, _sheet(cells, orders),
-        time_histories(actuator, part(progress, 0.9, 0.97)) if whole else [],
-        corner_rows(actuator, part(progress, 0.97, 1.0)) if whole else [],
-        meta,
+        rows, checks, load_kind, seed, replicates, effects, sheet,
+        time_histories(actuator, part(progress, 0.9, 0.97)),
+        corner_rows(actuator, part(progress, 0.97, 1.0)), meta,
     )  # fmt: skip
-
-
-def _provenance(actuator: Actuator) -> dict[str, Any]:
-    import elevon
-
-    return {"parameter_hash": actuator.parameters.hash, "version": elevon.__version__}
 
 
 def _air(place: int, count: int) -> float:
@@ -261,17 +252,18 @@ def _measures(recording: Recording, period: float) -> list[float]:
     ]
 
 
-def _row(
-    profile: MotionProfile,
-    load: float,
-    reason: str | None,
-    runs: Sequence[tuple[float, ...]],
+def _rows(
+    cells: Sequence[Case],
+    refusals: Sequence[str | None],
+    measured: Mapping[tuple[int, int], tuple[float, ...]],
     able: Capability,
-) -> BaselineRow:
-    if reason is not None:
-        return BaselineRow(profile, load, "refused", reason)
-    status = "limited" if able.limited(profile, load) else "ok"
-    return BaselineRow(profile, load, status, "", tuple(runs))
+) -> list[BaselineRow]:
+    rows = []
+    for place, ((profile, load), reason) in enumerate(zip(cells, refusals, strict=True)):
+        runs = tuple(run for (_, cell), run in sorted(measured.items()) if cell == place)
+        status = "limited" if able.limited(profile, load) else "ok"
+        rows.append(BaselineRow(profile, load, "refused" if reason else status, reason or "", runs))
+    return rows
 
 
 def _level(row: BaselineRow) -> list[float] | None:

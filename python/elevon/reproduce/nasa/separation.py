@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +32,7 @@ from elevon.reproduce.nasa.impact import GAP, gap_impacts, gap_traces, impact_ch
 from elevon.reproduce.nasa.population import draw_units
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
-from elevon.reproduce.nasa.store import CellStore, work_key
+from elevon.reproduce.nasa.store import CellStore, made_of, work_key
 from elevon.simulate import Run, completed, simulate_batch
 
 Array = npt.NDArray[np.float64]
@@ -113,7 +112,7 @@ def reproduce_separation(
         A run did not reach its end.
     """
     actuator = Actuator.load(ACTUATOR)
-    meta = _provenance(actuator)
+    meta = made_of(actuator)
     key = work_key(seed=seed, faults=[f.text() for f in faults], healthy=healthy,
                    reassemblies=reassemblies, **meta)  # fmt: skip
     store = CellStore(folder, key)
@@ -141,12 +140,6 @@ def reproduce_separation(
 def _profile(shape: str) -> MotionProfile:
     name, rounded, _ = shape.partition(ROUNDED)
     return MotionProfile(name, 0.05, 0.06, DURATION, ACCELERATION if rounded else 0.0)
-
-
-def _provenance(actuator: Actuator) -> dict[str, Any]:
-    import elevon
-
-    return {"parameter_hash": actuator.parameters.hash, "version": elevon.__version__}
 
 
 def _conditions(faults: Sequence[Seeded], load: float) -> dict[str, tuple[str, list[str]]]:

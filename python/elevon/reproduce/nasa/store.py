@@ -10,10 +10,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from elevon.actuator import Actuator
 from elevon.errors import OutputExistsError
 from elevon.files import write_text
 
 Array = npt.NDArray[np.float64]
+
+
+def made_of(actuator: Actuator) -> dict[str, str]:
+    """Return what else decides a cell: the actuator's numbers and the program."""
+    import elevon
+
+    return {"parameter_hash": actuator.parameters.hash, "version": elevon.__version__}
 
 
 def work_key(**facts: object) -> str:
