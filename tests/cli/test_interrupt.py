@@ -73,7 +73,7 @@ HALF = {
         ["validate", "LOG", "--actuator", "torino-rotary", "--report", "OUT/r.html", "--json"],
     ),
     "demo": (
-        "elevon.reproduce.backlash.reproduce_backlash",
+        "elevon.reproduce.backlash.campaign.reproduce_backlash",
         ["demo", "--part", "bench", "--out", "OUT/demo", "--json"],
     ),
     "campaign": (

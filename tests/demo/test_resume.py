@@ -188,7 +188,7 @@ class Chain:
         monkeypatch.setattr("elevon.demo.procedure.demo_procedure", lambda: procedure)
         monkeypatch.setattr(sys.modules["elevon.simulate"], "simulate", counted)
         replaced = {
-            "elevon.reproduce.backlash.reproduce_backlash": self.backlash,
+            "elevon.reproduce.backlash.campaign.reproduce_backlash": self.backlash,
             "elevon.reproduce.case_page.case_page": lambda _name, _result: Report("backlashes"),
             "elevon.logs.read.log_of": lambda path: path,
             "elevon.demo.run.import_log": lambda path, **_options: path,

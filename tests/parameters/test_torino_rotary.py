@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.reproduce.compliance import reproduce_compliance
+from elevon.reproduce.compliance.campaign import reproduce_compliance
 from elevon.units import parse_quantity
 
 ACTUATOR = elevon.Actuator.load("torino-rotary")

@@ -7,7 +7,7 @@ import pytest
 
 from elevon.cli import main
 from elevon.data import read_table
-from elevon.reproduce.compliance import reproduce_compliance
+from elevon.reproduce.compliance.campaign import reproduce_compliance
 
 RESULT = reproduce_compliance(resamples=300)
 

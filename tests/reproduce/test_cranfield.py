@@ -8,7 +8,7 @@ import pytest
 from elevon.cli import main
 from elevon.errors import InputError
 from elevon.reproduce.case_page import case_page
-from elevon.reproduce.cranfield import read_folder
+from elevon.reproduce.cranfield.data import read_folder
 from elevon.reproduce.cranfield.detection import detect
 from elevon.reproduce.cranfield.protocols import leave_load_out, leave_run_out
 from elevon.reproduce.cranfield.result import evaluate

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.reproduce.nasa import Capability, MotionProfile, profile_scenario, reproduce_baseline
-from elevon.reproduce.nasa.baseline import baseline_matrix
+from elevon.reproduce.nasa.baseline import baseline_matrix, reproduce_baseline
+from elevon.reproduce.nasa.capability import Capability
 from elevon.reproduce.nasa.features import orders
+from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
 SHORT = 6.0
 RUNS = "command,output_position,current_a,current_b,current_c@2 kHz"

@@ -7,8 +7,7 @@ from typing import Annotated
 
 from elevon.plain import Plain, key
 from elevon.report.checks import Check
-from elevon.reproduce.backlash import BacklashResult
-from elevon.reproduce.backlash.campaign import RowResult
+from elevon.reproduce.backlash.campaign import BacklashResult, RowResult
 
 
 @dataclass(frozen=True)

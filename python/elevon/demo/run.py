@@ -169,7 +169,7 @@ def _claim(demo: Demo, *, force: bool) -> None:
 
 
 def _backlash(demo: Demo, progress: Progress | None) -> None:
-    from elevon.reproduce.backlash import reproduce_backlash
+    from elevon.reproduce.backlash.campaign import reproduce_backlash
     from elevon.reproduce.case_page import case_page
 
     page = demo.folder / "backlash.html"

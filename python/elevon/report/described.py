@@ -47,7 +47,7 @@ _CONTROL = frozenset({"do", "at", "each", "when", "calls"})
 
 
 def described(
-    description: Mapping[str, Any], names: Mapping[str, object], *, date: str | None = None
+    description: Mapping[str, object], names: Mapping[str, object], *, date: str | None = None
 ) -> Report:
     """Return the report that a description makes of named values.
 
@@ -56,12 +56,11 @@ def described(
     jinja2.UndefinedError
         A text or an expression uses what is not there.
     """
-    report = Report(
-        text(description["title"], names), text(description.get("lead", ""), names), date=date
-    )
-    for fact in description.get("facts", ()):
+    page: _Names = description
+    report = Report(text(page["title"], names), text(page.get("lead", ""), names), date=date)
+    for fact in page.get("facts", ()):
         report.fact(*(text(item, names) for item in fact))
-    _parts(report, description, names)
+    _parts(report, page, names)
     return report
 
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.compare import RATES, compared_rate, filtered
 from elevon.data import read_table
 from elevon.errors import InputError, SimulationError
@@ -25,8 +25,6 @@ from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.scenario import Scenario
-
-Array = npt.NDArray[np.float64]
 
 ROTARY_FAULTS = tuple(row["fault"] for row in read_table("fault_sensitivity"))
 """One severity of each line of the catalogue (ASSUMED, see the table)."""
@@ -219,7 +217,7 @@ def features(recording: Recording, ratio: float, start: float) -> dict[str, floa
     tripped = recording.status == "tripped"
     grid = np.arange(start, max(float(recording.clock().time[-1]), start + 0.01), 1.0 / 400.0)
 
-    def value(name: str) -> Array:
+    def value(name: str) -> Floats:
         return np.asarray(np.interp(grid, recording[name].time, recording[name].values))
 
     values = {}

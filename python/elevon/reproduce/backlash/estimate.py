@@ -20,11 +20,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
-
-Array = npt.NDArray[np.float64]
 
 LEAD = 0.1
 """How long before the encoder's extremes the half periods are cut, in periods: the loop has had
@@ -47,11 +45,17 @@ class BacklashEstimate:
 
     total: float
     spread: float
-    each: Array
+    each: Floats
 
 
 def backlash_from_encoder(
-    time: Array, encoder: Array, blank: Array, *, frequency: float, loop_gain: float, start: float
+    time: Floats,
+    encoder: Floats,
+    blank: Floats,
+    *,
+    frequency: float,
+    loop_gain: float,
+    start: float,
 ) -> BacklashEstimate:
     """Recover the total backlash from two encoder signals of one sine command.
 
@@ -92,12 +96,12 @@ def backlash_from_encoder(
     return BacklashEstimate(float(each.mean()), float(each.std()), each)
 
 
-def lost_motion(time: Array, motor: Array, encoder: Array, start: float) -> float:
+def lost_motion(time: Floats, motor: Floats, encoder: Floats, start: float) -> float:
     """Return the range of motor position (at the output) less encoder after `start` [rad]."""
     return float(np.ptp((motor - encoder)[time >= start]))
 
 
-def flat_lengths(time: Array, encoder: Array, frequency: float, start: float) -> Array:
+def flat_lengths(time: Floats, encoder: Floats, frequency: float, start: float) -> Floats:
     """Return how long the encoder stands still at each of its extremes after `start` [s]."""
     centres = _half_periods(time, encoder, frequency, start)[0] + LEAD / frequency
     moves = np.flatnonzero(np.diff(encoder) != 0.0)
@@ -110,8 +114,8 @@ def flat_lengths(time: Array, encoder: Array, frequency: float, start: float) ->
 
 
 def _half_periods(
-    time: Array, encoder: Array, frequency: float, start: float
-) -> tuple[Array, Array]:
+    time: Floats, encoder: Floats, frequency: float, start: float
+) -> tuple[Floats, Floats]:
     """Begin of each half period around an extreme, and +1 for a top, -1 for a bottom."""
     used = time >= start
     angle = 2.0 * np.pi * frequency * time[used]
@@ -132,6 +136,6 @@ def _half_periods(
     return cuts[whole], signs[whole]
 
 
-def _integral(time: Array, values: Array) -> Array:
+def _integral(time: Floats, values: Floats) -> Floats:
     steps = np.diff(time) * (values[1:] + values[:-1]) / 2.0
     return np.concatenate([[0.0], np.cumsum(steps)])

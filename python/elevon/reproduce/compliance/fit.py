@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.estimate.regression import huber
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,23 +42,23 @@ class ComplianceFit:
 
     stiffness: float
     offset: float
-    group_offsets: Array
-    residuals: Array
-    weights: Array
+    group_offsets: Floats
+    residuals: Floats
+    weights: Floats
     scale: float
 
 
-def load_on_loss(load: Array, loss: Array) -> float:
+def load_on_loss(load: Floats, loss: Floats) -> float:
     """Slope of the least-squares line of load on loss (load per loss)."""
     return _slope(loss, load)
 
 
-def loss_on_load(load: Array, loss: Array) -> float:
+def loss_on_load(load: Floats, loss: Floats) -> float:
     """Inverse slope of the least-squares line of loss on load (load per loss)."""
     return 1.0 / _slope(load, loss)
 
 
-def deming_stiffness(load: Array, loss: Array, load_sd: float, loss_sd: float) -> float:
+def deming_stiffness(load: Floats, loss: Floats, load_sd: float, loss_sd: float) -> float:
     """Slope of the line that allows errors in both (Deming), for known standard deviations.
 
     Raises
@@ -81,7 +80,7 @@ def deming_stiffness(load: Array, loss: Array, load_sd: float, loss_sd: float) -
 
 
 def fit_compliance(
-    load: Array, loss: Array, group: npt.ArrayLike | None = None, *, robust: bool = True
+    load: Floats, loss: Floats, group: npt.ArrayLike | None = None, *, robust: bool = True
 ) -> ComplianceFit:
     """Fit loss against load, with an offset a group.
 
@@ -120,8 +119,8 @@ def fit_compliance(
 
 
 def bootstrap_interval(
-    load: Array,
-    loss: Array,
+    load: Floats,
+    loss: Floats,
     group: npt.ArrayLike | None = None,
     *,
     cluster: npt.ArrayLike,
@@ -166,12 +165,12 @@ def bootstrap_interval(
     return float(low), float(high)
 
 
-def _slope(x: Array, y: Array) -> float:
+def _slope(x: Floats, y: Floats) -> float:
     centred = x - x.mean()
     return float(centred @ y / (centred @ centred))
 
 
-def _design(load: Array, group: npt.ArrayLike | None) -> Array:
+def _design(load: Floats, group: npt.ArrayLike | None) -> Floats:
     columns = [load, np.ones(len(load))]
     if group is not None:
         labels = np.asarray(group)

@@ -38,7 +38,6 @@ from elevon.reproduce.nasa.profiles import PROFILES, LoadKind, MotionProfile, pr
 from elevon.reproduce.nasa.store import CellStore, made_of, work_key
 from elevon.simulate import Run, completed, simulate_batch
 
-Array = npt.NDArray[np.float64]
 Case = tuple[MotionProfile, float]
 
 ACTUATOR = "nasa-ballscrew"

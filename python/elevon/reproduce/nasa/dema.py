@@ -15,15 +15,13 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
-
-Array = npt.NDArray[np.float64]
 
 DEMA = "nasa-dema"
 """The set: what of the small actuator is printed, and what is ASSUMED and why."""
@@ -94,11 +92,11 @@ class DemaFit:
     """
 
     rows: list[FitRow]
-    time: Array
-    measured: Array
-    fitted: Array
-    air: Array
-    steady: Array
+    time: Floats
+    measured: Floats
+    fitted: Floats
+    air: Floats
+    steady: Floats
     checks: list[Check]
     parameter_hash: str
 
@@ -150,7 +148,7 @@ def fit_dema(seed: int = 0, progress: Progress | None = None) -> DemaFit:
     return DemaFit(rows, seconds, measured, runs[0], felt, steady, checks, dema.parameters.hash)
 
 
-def _averaged(time: Array, values: Array) -> tuple[Array, Array]:
+def _averaged(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return middles and means of stretches of `AIR_MEANS`."""
     count = len(time) // int(AIR_MEANS)
     size = count * int(AIR_MEANS)
@@ -160,10 +158,10 @@ def _averaged(time: Array, values: Array) -> tuple[Array, Array]:
 
 def _hours(
     nominal: Actuator,
-    values: Sequence[Array],
-    air: tuple[Array, Array],
+    values: Sequence[Floats],
+    air: tuple[Floats, Floats],
     progress: Progress | None,
-) -> list[Array]:
+) -> list[Floats]:
     """Surface, nut and winding [K] of an hour at 1 Hz under each set of logarithms.
 
     `air` has instants [s] and temperatures [K]; of a single instant the air stays.
@@ -191,12 +189,12 @@ def _hours(
     ]
 
 
-def _named(logarithms: Array) -> Mapping[str, float]:
+def _named(logarithms: Floats) -> Mapping[str, float]:
     return {path: float(np.exp(x)) for path, x in zip(FITTED, logarithms, strict=True)}
 
 
 def _checks(
-    rows: Sequence[FitRow], measured: Array, runs: tuple[Array, Array], truth: Array
+    rows: Sequence[FitRow], measured: Floats, runs: tuple[Floats, Floats], truth: Floats
 ) -> list[Check]:
     """The paper's two figures, and that they would not be kept if the air's rise were left out."""
     fitted, steady = runs

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from elevon.arrays import Floats
 
 LEVEL = 0.95
 
@@ -61,8 +61,8 @@ def terms(factors: Sequence[TwoLevelFactor]) -> list[tuple[int, ...]]:
 
 
 def model_matrix(
-    factors: Sequence[TwoLevelFactor], levels: Array, block: npt.NDArray[np.int64]
-) -> Array:
+    factors: Sequence[TwoLevelFactor], levels: Floats, block: npt.NDArray[np.int64]
+) -> Floats:
     """Return the columns of the model: blocks, then the terms.
 
     Parameters
@@ -80,7 +80,10 @@ def model_matrix(
 
 
 def fit_effects(
-    factors: Sequence[TwoLevelFactor], levels: Array, block: npt.NDArray[np.int64], response: Array
+    factors: Sequence[TwoLevelFactor],
+    levels: Floats,
+    block: npt.NDArray[np.int64],
+    response: Floats,
 ) -> list[FactorEffect]:
     """Return the effect of every term with its interval.
 
@@ -110,7 +113,7 @@ def fit_effects(
     ]
 
 
-def _holm(p: Array) -> Array:
+def _holm(p: Floats) -> Floats:
     """Holm's correction of several probabilities."""
     order = np.argsort(p)
     scaled = np.maximum.accumulate(p[order] * np.arange(p.size, 0, -1))
@@ -121,7 +124,7 @@ def _holm(p: Array) -> Array:
 
 def coverage(
     factors: Sequence[TwoLevelFactor],
-    levels: Array,
+    levels: Floats,
     block: npt.NDArray[np.int64],
     truth: Mapping[str, Any],
     *,

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from elevon.arrays import Floats
 
 POWER = 0.95
 """A best profile is named where another experiment would name it again this often: intervals that
@@ -75,7 +74,7 @@ class EffectScale:
         self._faulty = rng.standard_t(faulty - 1, pivots) / math.sqrt(faulty)
         self._correction = 1.0 - 3.0 / (4.0 * (healthy - 1) - 1.0)
 
-    def effect(self, healthy: Array, faulty: Array) -> Effect:
+    def effect(self, healthy: Floats, faulty: Floats) -> Effect:
         """Return the effect of one feature; a population that does not vary has none.
 
         Parameters
@@ -95,7 +94,7 @@ class EffectScale:
         return Effect(self._correction * moved / deviation, float(low), float(high))
 
 
-def null_p(healthy: Array, faulty: Array) -> Array:
+def null_p(healthy: Floats, faulty: Floats) -> Floats:
     """Return the probability that equal means differ so much, along the first axis.
 
     Welch's t, with the deviation of the second, small group no less than that of the first, as

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from elevon.arrays import Floats
 from elevon.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 RECORD = "motor_position,motor_speed,current_ref,joint_force@2 kHz"
 SETTLE = 1.0
@@ -32,7 +30,7 @@ LEAST_SPEED = 10.0
 LEAST_TURNS = 4.0
 
 
-def features(recording: Recording) -> Array:
+def features(recording: Recording) -> Floats:
     """Return every feature of one run in the order of `FEATURES`."""
     late = recording["current_ref"].time >= SETTLE
     value = {name: recording[name].values[late] for name in recording.names}
@@ -43,7 +41,7 @@ def features(recording: Recording) -> Array:
     return np.array([rms, *lines, float(np.max(np.abs(value["joint_force"])))])
 
 
-def compared(values: Array) -> Array:
+def compared(values: Floats) -> Floats:
     """Return the features in the scale in which groups are compared, shape (units, features).
 
     The amplitude of a line has no sign, so its scatter between healthy units leans to one side;
@@ -52,7 +50,7 @@ def compared(values: Array) -> Array:
     return np.where(_ROOTED, np.sqrt(np.abs(values)), values)
 
 
-def orders(angle: Array, speed: Array, signal: Array, wanted: Sequence[float]) -> list[float]:
+def orders(angle: Floats, speed: Floats, signal: Floats, wanted: Sequence[float]) -> list[float]:
     """Return the amplitude of a signal at some orders of the shaft, median over the strokes.
 
     Parameters
@@ -79,7 +77,7 @@ def orders(angle: Array, speed: Array, signal: Array, wanted: Sequence[float]) -
     return [float(x) for x in np.median(np.array(levels), axis=0)]
 
 
-def _stroke_orders(angle: Array, signal: Array, wanted: Sequence[float]) -> list[float]:
+def _stroke_orders(angle: Floats, signal: Floats, wanted: Sequence[float]) -> list[float]:
     """Least squares over one stroke: a slow cubic trend and a windowed line at each order."""
     turned = np.abs(angle - angle[0])
     # The first and the last turn hold the reversal's transient.

@@ -8,15 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.progress import Progress
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.units import to_si
-
-Array = npt.NDArray[np.float64]
 
 RECORD = (
     "command,output_position,joint_force,current_ref,winding_temperature,surface_temperature@200 Hz"
@@ -38,8 +34,8 @@ class HistoryFigure:
 
     figure: int
     title: str
-    time: Array
-    curves: dict[str, Array]
+    time: Floats
+    curves: dict[str, Floats]
 
 
 def _conditions() -> list[tuple[int, str, dict[str, Any]]]:

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain, key
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.features import FEATURES, PEAK
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 
-Array = npt.NDArray[np.float64]
-Cells = Mapping[tuple[str, float], Mapping[str, Array]]
+Cells = Mapping[tuple[str, float], Mapping[str, Floats]]
 
 GAP = "gap 0.5 mm"
 GAP_FAULT = "adapter_gap@adapter=0.5 mm"
@@ -51,11 +50,11 @@ class ImpactTrace:
     profile: str
     load: float
     gap: bool
-    time: Array
-    force: Array
+    time: Floats
+    force: Floats
 
 
-def _difference(healthy: Array, faulty: Array) -> tuple[float, float, float]:
+def _difference(healthy: Floats, faulty: Floats) -> tuple[float, float, float]:
     """Mean difference and its Welch interval."""
     from scipy.stats import ttest_ind
 

@@ -14,9 +14,9 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.progress import Progress, part
 from elevon.report.checks import Check
 from elevon.reproduce.nasa.corners import ACCELERATION
@@ -34,8 +34,6 @@ from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
 from elevon.reproduce.nasa.separation_rows import Seeded, SeparationResult, SeparationRow
 from elevon.reproduce.nasa.store import CellStore, made_of, work_key
 from elevon.simulate import Run, completed, simulate_batch
-
-Array = npt.NDArray[np.float64]
 
 ACTUATOR = "nasa-ballscrew"
 ROUNDED = ", rounded"
@@ -120,7 +118,7 @@ def reproduce_separation(
     units = {"healthy": draw_units(nominal, "healthy", healthy, seed)}
     units |= {f.name: draw_units(nominal, f.name, reassemblies, seed) for f in faults}
     cells = [(shape, load) for load in loads for shape in shapes]
-    simulated: dict[tuple[str, float], dict[str, Array]] = {}
+    simulated: dict[tuple[str, float], dict[str, Floats]] = {}
     for index, (shape, load) in enumerate(cells):
         span = part(progress, index / len(cells), (index + 1) / len(cells))
         simulated[shape, load] = _cell(
@@ -161,7 +159,7 @@ def _cell(
     seed: int,
     store: CellStore,
     progress: Progress | None,
-) -> dict[str, Array]:
+) -> dict[str, Floats]:
     """Features of every unit of one profile and load, by condition; shape (units, features)."""
     from elevon.scenario import Scenario
 
@@ -182,7 +180,7 @@ def _cell(
 
 def _simulated(
     runs: Sequence[Run], name: str, store: CellStore, progress: Progress | None
-) -> Array:
+) -> Floats:
     """Features of all runs, a few at a time to bound the memory of their recordings."""
     chunks = []
     for start in range(0, len(runs), CHUNK):
@@ -199,7 +197,7 @@ def _simulated(
 
 
 def _rows(
-    simulated: Mapping[tuple[str, float], Mapping[str, Array]],
+    simulated: Mapping[tuple[str, float], Mapping[str, Floats]],
     faults: Sequence[Seeded],
     scale: EffectScale,
     level: float,
@@ -234,7 +232,7 @@ def _rows(
     return rows
 
 
-def _effect(scale: EffectScale, cell: Mapping[str, Array], name: str, column: int) -> Effect:
+def _effect(scale: EffectScale, cell: Mapping[str, Floats], name: str, column: int) -> Effect:
     return scale.effect(compared(cell["healthy"])[:, column], compared(cell[name])[:, column])
 
 
@@ -246,7 +244,7 @@ def _draws(best: GroupComparison, effects: Sequence[Effect], drawn: int) -> int 
 
 
 def _null(
-    cells: Mapping[tuple[str, float], Mapping[str, Array]], group: int, level: float, seed: int
+    cells: Mapping[tuple[str, float], Mapping[str, Floats]], group: int, level: float, seed: int
 ) -> tuple[float, float]:
     """Compare healthy units with healthy units over random splits of the population.
 

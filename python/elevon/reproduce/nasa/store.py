@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.errors import OutputExistsError
 from elevon.files import write_text
-
-Array = npt.NDArray[np.float64]
 
 
 def made_of(actuator: Actuator) -> dict[str, str]:
@@ -63,12 +61,12 @@ class CellStore:
                 f"{path}: cannot be read ({error}); remove it to begin again"
             ) from error
 
-    def get(self, name: str) -> Array | None:
+    def get(self, name: str) -> Floats | None:
         """Return a finished cell, None where it is not there."""
         values = self._cells.get(name)
         return None if values is None else np.array(values, dtype=float)
 
-    def put(self, name: str, values: Array) -> None:
+    def put(self, name: str, values: Floats) -> None:
         """Keep a finished cell."""
         self._cells[name] = values.tolist()
         if self._path is not None:

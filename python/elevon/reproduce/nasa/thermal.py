@@ -6,17 +6,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.parameters.relations import copper_loss
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.nasa.dema import DemaFit, fit_dema
 from elevon.reproduce.nasa.profiles import MotionProfile, profile_scenario
-
-Array = npt.NDArray[np.float64]
 
 ACTUATOR = "nasa-ballscrew"
 HOUR = 3600.0
@@ -47,10 +45,10 @@ LOCKED = {
 class ThermalResult:
     """Everything `elevon reproduce nasa-thermal` reports. Temperatures in K, heat in W."""
 
-    time: Array
-    winding: Array
-    surface: Array
-    heat: Array
+    time: Floats
+    winding: Floats
+    surface: Floats
+    heat: Floats
     checks: list[Check]
     fit: DemaFit | None = None
     meta: dict[str, Any] = field(default_factory=dict)
@@ -147,7 +145,7 @@ def steady_state(actuator: Actuator, square: float) -> tuple[float, float]:
     return winding, winding - power(winding) * value("thermal.winding_to_surface")
 
 
-def closed_form(actuator: Actuator, square: float, time: Array) -> Array:
+def closed_form(actuator: Actuator, square: float, time: Floats) -> Floats:
     """Return the winding's temperature [K] at constant currents without radiation, shape (n,).
 
     Parameters
@@ -268,7 +266,7 @@ def _trend_checks(hour: Recording) -> list[Check]:
     ]
 
 
-def _cycle_mean(time: Array, values: Array, centres: Array, period: float) -> Array:
+def _cycle_mean(time: Floats, values: Floats, centres: Floats, period: float) -> Floats:
     """Return the mean over one period about each centre (less at the ends), shape of `centres`."""
     steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
     total = np.concatenate([[0.0], np.cumsum(steps)])
