@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from importlib.resources import files
 from typing import Any
 
 from elevon.campaign.dataset import Dataset
@@ -58,6 +59,7 @@ def _counts(counts: dict[str, int]) -> str:
 
 _FAULT_TITLES = ("fault", "unit", "runs", "smallest", "median", "largest", "distribution")
 _VARIED_TITLES = ("quantity", "role", "unit", "smallest", "median", "largest", "distribution")
+_COLUMN_TITLES = ("column", "unit", "text")
 _BARS = " ▁▂▃▄▅▆▇█"
 
 
@@ -67,6 +69,14 @@ def _fault_rows(about: dict[str, Any]) -> list[list[object]]:
 
 def _varied_rows(about: dict[str, Any]) -> list[list[object]]:
     return [[v["name"], v["role"], v["unit"], *_shape(v)] for v in about["varied"]]
+
+
+def _column_rows(about: dict[str, Any]) -> list[tuple[str, list[list[object]]]]:
+    """Return each clock's folder and its columns."""
+    return [
+        (f"runs/{clock['name']}", [[c["name"], c["unit"], c["text"]] for c in clock["columns"]])
+        for clock in about["clocks"]
+    ]
 
 
 def _shape(item: dict[str, Any]) -> list[object]:
@@ -81,26 +91,33 @@ def _shape(item: dict[str, Any]) -> list[object]:
 
 
 def _markdown(about: dict[str, Any], ds: Dataset) -> str:
-    text = markdown_text(about["text"] or "Simulated runs of one actuator.")
-    lines = [f"# {markdown_text(about['name'])}", "", text, ""]
-    lines += [f"* {markdown_text(fact)}" for fact in _facts(about)]
-    lines += [
-        "* `plan.toml` is the plan as given, `resolved.json` all that it means,",
-        "  `manifest.json` every file with its SHA-256; `elevon dataset verify` checks them.",
-        *(["* `card.html` shows typical signals of each fault."] if ds.clocks else []),
-        "",
-        "```python",
-        *_code(ds).splitlines(),
-        "```",
-        *_md_table("Faults", _FAULT_TITLES, _fault_rows(about)),
-        *_md_table("Varied quantities", _VARIED_TITLES, _varied_rows(about)),
-        *_not_acting(about),
-        *_failed(about),
-    ]
-    for clock in about["clocks"]:
-        rows = [[c["name"], c["unit"], c["text"]] for c in clock["columns"]]
-        lines += _md_table(f"Columns of `runs/{clock['name']}`", ("column", "unit", "text"), rows)
-    return "\n".join(lines) + "\n"
+    import jinja2
+
+    # Every text of somebody else goes through `markdown_text`.
+    environment = jinja2.Environment(  # noqa: S701
+        trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters |= {"md": markdown_text, "cell": _cell}
+    source = (files("elevon.campaign") / "card.md.j2").read_text("utf-8")
+    text = environment.from_string(source).render(
+        about=about,
+        facts=_facts(about),
+        code=_code(ds),
+        clocks=ds.clocks,
+        failed=_failed(about),
+        tables=[
+            ("Faults", _FAULT_TITLES, _fault_rows(about)),
+            ("Varied quantities", _VARIED_TITLES, _varied_rows(about)),
+        ],
+        columns=[
+            (f"Columns of `{name}`", _COLUMN_TITLES, rows) for name, rows in _column_rows(about)
+        ],
+    )
+    return text.rstrip() + "\n"
+
+
+def _cell(cell: object) -> str:
+    return markdown_text(f"{cell:.5g}" if isinstance(cell, float) else str(cell))
 
 
 def _code(ds: Dataset) -> str:
@@ -116,29 +133,13 @@ def _code(ds: Dataset) -> str:
     )
 
 
-def _md_table(title: str, titles: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:
-    if rows:
-        yield from ("", f"## {title}", "", f"| {' | '.join(titles)} |", "|---" * len(titles) + "|")
-        for row in rows:
-            cells = [f"{cell:.5g}" if isinstance(cell, float) else str(cell) for cell in row]
-            yield f"| {' | '.join(map(markdown_text, cells))} |"
-
-
-def _not_acting(about: dict[str, Any]) -> Iterator[str]:
-    if about["not_acting"]:
-        yield from ("", "## Set, but without effect", "")
-        yield from (f"* {markdown_text(text)}" for text in about["not_acting"])
-
-
-def _failed(about: dict[str, Any]) -> Iterator[str]:
-    if about["failed"]:
-        yield from ("", "## Runs that failed", "")
-        listed = about["failed"][:_FAILED_LISTED]
-        yield from (
-            f"* run {f['run']}: {f['status']}: {markdown_text(f['reason'])}" for f in listed
-        )
-        if len(about["failed"]) > len(listed):
-            yield "* and more: see `status` and `reason` in `runs.parquet`"
+def _failed(about: dict[str, Any]) -> list[str]:
+    lines = [
+        f"run {f['run']}: {f['status']}: {markdown_text(f['reason'])}"
+        for f in about["failed"][:_FAILED_LISTED]
+    ]
+    more = len(about["failed"]) > len(lines)
+    return [*lines, "and more: see `status` and `reason` in `runs.parquet`"][: len(lines) + more]
 
 
 def _page(about: dict[str, Any], ds: Dataset) -> str:
@@ -157,13 +158,11 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
     if about["not_acting"]:
         report.section("Set, but without effect").points(about["not_acting"])
     if about["failed"]:
-        report.section("Runs that failed").points([*_failed(about)][3:])
+        report.section("Runs that failed").points([f"* {line}" for line in _failed(about)])
     if ds.clocks:
         _pictures(report.section("Typical signals"), ds)
-    for clock in about["clocks"]:
-        rows = [[c["name"], c["unit"], c["text"]] for c in clock["columns"]]
-        table = ReportTable(("column", "unit", "text"), rows, folded=f"runs/{clock['name']}")
-        report.section(f"Columns of runs/{clock['name']}").table(table)
+    for name, rows in _column_rows(about):
+        report.section(f"Columns of {name}").table(ReportTable(_COLUMN_TITLES, rows, folded=name))
     keys = ("version", "plan_hash", "actuator", "fidelity")
     report.provenance({key: about[key] for key in keys} | about["sources"])
     return report.html()

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.calibrate.slips import Slip, WeightDrop, find_slips, printed_drops
 from elevon.plain import fields_of
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.compliance.fit import (
-    Array,
     ComplianceFit,
     bootstrap_interval,
     deming_stiffness,
@@ -167,7 +167,7 @@ def _variants(
     ]  # fmt: skip
 
 
-def _variant(name: str, load: Array, loss: Array) -> AngleColumns:
+def _variant(name: str, load: Floats, loss: Floats) -> AngleColumns:
     from scipy.stats import theilslopes
 
     slope = float(theilslopes(loss, load)[0])
@@ -177,7 +177,7 @@ def _variant(name: str, load: Array, loss: Array) -> AngleColumns:
     )
 
 
-def _curvature(load: Array, loss: Array, group: np.ndarray[Any, Any]) -> float:
+def _curvature(load: Floats, loss: Floats, group: np.ndarray[Any, Any]) -> float:
     """Return the p value of the F test for a quadratic term in the load."""
     from scipy.stats import f as f_distribution
 
@@ -213,7 +213,7 @@ def _against(name: str, ours: float, printed: float, limit: float) -> Check:
     return Check(name, abs(ours - printed), limit, "N/deg", ours=ours)
 
 
-def _columns(drops: Sequence[WeightDrop]) -> tuple[Array, Array]:
+def _columns(drops: Sequence[WeightDrop]) -> tuple[Floats, Floats]:
     return (
         np.array([drop.load_n for drop in drops]),
         np.array([drop.loss_deg for drop in drops]),
