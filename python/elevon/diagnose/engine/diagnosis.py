@@ -170,7 +170,7 @@ def _status(
         return "healthy", None, unexplained(cases, named)
     if not named or result.other >= _UNKNOWN:
         text = f"{NO_CANDIDATE} (probability {result.other:.2g})"
-        against = farthest(cases[_worst(cases)])
+        against: Reason | None = farthest(cases[_worst(cases)])
     else:
         against = refuting(cases, named)
         if against is None:
