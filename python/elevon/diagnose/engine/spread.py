@@ -28,7 +28,7 @@ STATED = 20.0
 #: Of the factor that all features' variances have in common, each as likely. ASSUMED: so wide that
 #: one baseline decides; a factor below one is none, as the stated deviations are least ones.
 _FACTORS = np.geomspace(1.0, 100.0, 61)
-_FAR = 8.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is no matter of all
+_FAR = 3.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is no matter of all
 FORMAT = "elevon-spread"
 _VERSION = 2
 _ENDS = (0.05, 0.95)
