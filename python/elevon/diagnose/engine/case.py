@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Faults = Sequence[tuple[CandidateFault, float]]
 
 ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
+ALONE = 0.1  # of them: what moves one feature and is no candidate. ASSUMED
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _FEWER = 5000  # draws that show such a chance
 _LOW = "low."  # parameters that `elevon fit-low` fits to the switching model
@@ -234,19 +235,23 @@ def detector_of(
 
     A shift shorter than
     `_DIRECTED` has no direction that is known: the runs' rounding is as large, and another in each.
-    Each feature alone is a direction, too: something else may move no other.
+    Each feature alone is a direction, too, for a share of its own: something else may move no
+    other.
     """
     residual, covariance = joined(cases)
     root = np.linalg.inv(np.linalg.cholesky(covariance))
-    rows, both = [root.T], [True] * len(root)
+    rows = []
     for c in candidates:
         at = cases[0].model.severities[c.key]
         moved = shift_of(cases, c.key, at[at != 0.0]) @ root.T
         rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
-        both += [False] * len(rows[-1])
     degrees = min(case.unit.degrees for case in cases)
     draws = _drawn(cases, count) @ root.T
-    return residual, root, Detector(np.vstack(rows), both, degrees, ANYWHERE, draws)
+    ways = np.vstack([np.zeros((0, len(root))), *rows])
+    detector = Detector(
+        ways, [False] * len(ways), degrees, ANYWHERE, draws, each=root.T, alone=ALONE
+    )
+    return residual, root, detector
 
 
 def _drawn(cases: Sequence[LogCase], count: int) -> Floats:
