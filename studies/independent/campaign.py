@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from studies.independent.result import IndependentResult
 
 _RATE = 0.05  # of false alarms that is set
-_ALWAYS = (1, 3)  # baselines that every healthy log is given
+_FEW = (1, 3)  # baselines that a healthy log of another actuator is given
 _BEYOND = 5.0  # deviations of the unit's healthy days, of one feature: a cause has moved the log
 #: Actuators whose logs the switching model makes, for want of another program: test of each.
 SWITCHING = (("nasa-ballscrew", "sine-opposing"), ("pisa-landing-gear", "extension-nominal"))
@@ -68,7 +68,7 @@ class Plan:
     learned : int
         Days of each test from which a unit's spread is learnt, none of them judged or a baseline.
     baselines : tuple of int
-        Numbers of baselines; other than one and three for a third of the logs.
+        Numbers of baselines that each healthy log is given.
     """
 
     units: int
@@ -82,10 +82,6 @@ class Plan:
     def key(self) -> str:
         """What tells its work from another's; units do not know how many they are."""
         return f"independent {replace(self, units=0)}"
-
-    def counts(self, number: int) -> list[int]:
-        """Return how many baselines the healthy log of a number is given."""
-        return [b for b in self.baselines if b in _ALWAYS or number < self.healthy // 3]
 
 
 @dataclass(frozen=True)
@@ -198,8 +194,8 @@ def _of_test(judge: _Judge, plan: Plan, make: Callable[..., Log]) -> list[Judged
     test, turn = judge.test, list(TESTS).index(judge.test)
     days = [make(test, 100 + n) for n in range(plan.healthy)]
     out = []
-    for n, log in enumerate(days):
-        out += [judge.of("healthy", "", log, b) for b in plan.counts(n)]
+    for log in days:
+        out += [judge.of("healthy", "", log, b) for b in plan.baselines]
         if judge.spread is not None:
             out.append(judge.of("healthy", "", log, 1, learned=True))
     usual = _usual([*judge.base, *(reading_of(log, judge.actuator) for log in days)])
@@ -320,7 +316,7 @@ def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
 
     actuator = Actuator.load(name)
     test = next(t for t in standard_tests(actuator) if t.name == title)
-    most = max(_ALWAYS)
+    most = max(_FEW)
     days = [Day((), 100_000 * plan.seed + n) for n in range(most + plan.switching)]
     unit = Unit(0, None, None, RATES[0])
     with warnings.catch_warnings():
@@ -329,5 +325,5 @@ def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
         base = [replace(log, name=f"baseline {k}") for k, log in enumerate(logs[:most])]
         first = [reading_of(log, actuator) for log in base]
         judge = _Judge(unit, title, actuator, first).of
-        rows = [judge("healthy", "", log, count) for log in logs[most:] for count in _ALWAYS]
+        rows = [judge("healthy", "", log, count) for log in logs[most:] for count in _FEW]
     return [replace(row, program=name) for row in rows]

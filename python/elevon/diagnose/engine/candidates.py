@@ -46,6 +46,8 @@ class CandidateFault:
     known_features : tuple of str
         Features whose shift is known; what moves beside them depends on an angle that no log
         shows, so it only makes those features uncertain. Empty: all of them.
+    either : bool
+        Whether that is moved in full or not at all, as the unit is wired, which no log shows.
     ambiguous : tuple of (str, str)
         Faults that are no candidates themselves: in closed form they move the same features.
     switched : bool
@@ -67,6 +69,7 @@ class CandidateFault:
     same: tuple[str, ...] = ()
     fixed_features: tuple[str, ...] = ()
     known_features: tuple[str, ...] = ()
+    either: bool = False
     ambiguous: tuple[tuple[str, str], ...] = ()
     switched: bool = False
     whole: bool = False
@@ -142,7 +145,7 @@ CANDIDATES: tuple[CandidateFault, ...] = (
     CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05,
                    amplified=_AMPLIFIED["control.speed"]),
     CandidateFault("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01,
-                   known_features=("position_scale",),
+                   known_features=("position_scale",), either=True,
                    ambiguous=(("gain", "sensor.resolver"),)),
     CandidateFault("gain", _CURRENTS[0], "1", -0.3, 0.3, _SENSOR / 3, 0.10, _CURRENTS[1:],
                    _VOLTAGES),

@@ -209,10 +209,15 @@ def bounded(moved: Floats, records: Sequence[Feature], values: Floats) -> Floats
 
 
 def _known_part(c: CandidateFault, full: Floats, names: Sequence[str]) -> tuple[Floats, Floats]:
-    """Split shifts into what is known of them and what depends on an angle that no log shows."""
+    """Split shifts into what is known of them and what depends on what no log shows.
+
+    What is moved in full or not at all has the mean and the deviation of the two cases.
+    """
     known = np.array([not c.known_features or n in c.known_features for n in names])
     there = np.array([n not in c.fixed_features for n in names])
-    return full * (known & there), np.abs(full * ~known)
+    part = 0.5 if c.either else 1.0
+    unsure = full * ~known * part
+    return full * (known & there) + (unsure if c.either else 0.0), np.abs(unsure)
 
 
 def _healthy_days(draws: Floats, steps: Floats | None, healthy: Floats) -> tuple[Floats, Floats]:

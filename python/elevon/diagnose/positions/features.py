@@ -64,7 +64,7 @@ FEATURES = _table(
     Feature("voltage_order_2", "1", "share of the EMF at twice the electrical angle",
             (0.0, 0.002), (0.0, 0.006), 0.40, "size"),
     Feature("speed_gain", "A s/rad", "current set point by speed error",
-            (0.02, 0.0), (0.30, 0.0), kind="share"),
+            (0.03, 0.0), (0.40, 0.0), kind="share"),
     Feature("following_gain", "s", "following error over speed set point: 1/position gain",
             (0.0005, 0.0), (0.004, 0.0), kind="share", constant=True),
     Feature("current_sideband", "1",
@@ -75,6 +75,9 @@ FEATURES = _table(
             (0.0, 0.002), (0.0, 0.006), 0.40, "size"),
 )  # fmt: skip
 _BLOCKS = 16  # stretches of a log whose scores give the deviations
+#: Stretches of what a speed controller's law leaves, each less the one before it: at each reversal
+#: it is off alike in all logs of a test, which is no noise, and longer stretches take it for some.
+_SHORT = 256
 #: Share of what the voltage's regression leaves that may be in step with a column: the current
 #: controller answers its sensor's noise by voltage, and that repeats with the motion, so stretches
 #: of a log do not show it. ASSUMED: from units of another program whose speed is steady.
@@ -157,7 +160,7 @@ def regress(columns: Sequence[Floats], data: Floats) -> tuple[Floats, Floats]:
     return _regress(np.stack([*columns, data]), True)
 
 
-def _regress(rows: Floats, deviations: bool) -> tuple[Floats, Floats]:
+def _regress(rows: Floats, deviations: bool, *, short: bool = False) -> tuple[Floats, Floats]:
     """Regress the last of the rows, shape (k + 1, n), on the others; they are scaled in place."""
     count = len(rows) - 1
     gram = rows @ rows.T
@@ -170,21 +173,31 @@ def _regress(rows: Floats, deviations: bool) -> tuple[Floats, Floats]:
     columns = rows[:count]
     columns /= scale[:, None]
     score = columns * (rows[count] - beta @ columns)
-    parts = np.add.reduceat(score, _edges(score.shape[1]), axis=1)
-    covariance = inverse @ (parts @ parts.T) @ inverse * _BLOCKS / (_BLOCKS - 1)
+    covariance = inverse @ _scatter(score, short=short) @ inverse
     return beta / scale, covariance / np.outer(scale, scale)
 
 
-def _fit(columns: Sequence[Floats], target: Floats, use: Bools, deviations: bool) -> Fit:
+def _scatter(score: Floats, *, short: bool) -> Floats:
+    """Covariance of the scores' sum, shape (k, k), by stretches; short ones by their steps."""
+    parts = np.add.reduceat(score, _edges(score.shape[1], _SHORT if short else _BLOCKS), axis=1)
+    if short:
+        steps = np.diff(parts, axis=1)
+        return np.asarray(0.5 * steps @ steps.T)
+    return np.asarray(parts @ parts.T * _BLOCKS / (_BLOCKS - 1))
+
+
+def _fit(
+    columns: Sequence[Floats], target: Floats, use: Bools, deviations: bool, *, short: bool = False
+) -> Fit:
     at = np.flatnonzero(use)
     rows = np.empty((len(columns) + 1, len(at)))
     for row, column in zip(rows, (*columns, target), strict=True):
         np.take(column, at, out=row, mode="clip")
-    return _regress(rows, deviations)
+    return _regress(rows, deviations, short=short)
 
 
-def _edges(count: int) -> npt.NDArray[np.intp]:
-    return np.linspace(0, count, _BLOCKS, endpoint=False).astype(np.intp)
+def _edges(count: int, blocks: int) -> npt.NDArray[np.intp]:
+    return np.linspace(0, count, min(blocks, count), endpoint=False).astype(np.intp)
 
 
 def _one(fit: Fit, at: int, factor: float = 1.0) -> tuple[float, float]:
@@ -311,7 +324,8 @@ def _control(signals: Log, width: float, deviations: bool) -> dict[str, tuple[fl
     inside = signals.good & (size < 0.999 * float(size.max()))
     integral = np.cumsum(error) * width
     columns = [error, integral, np.gradient(error, width), np.ones_like(error)]
-    rows = {"speed_gain": _one(_fit(columns, signals.current_target, inside, deviations), 0)}
+    law = _fit(columns, signals.current_target, inside, deviations, short=True)
+    rows = {"speed_gain": _one(law, 0)}
     if signals.gain is not None:
         gain, std = signals.gain
         rows["following_gain"] = (1.0 / gain, std / gain**2)
