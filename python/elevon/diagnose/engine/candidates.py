@@ -110,6 +110,7 @@ _LOOP_NOISE = ("target_noise", "control_noise", "voltage_noise", "voltage_rest")
 _AMPLIFIED = {
     "control.position": ("reference_noise", *_LOOP_NOISE), "control.speed": _LOOP_NOISE,
 }  # fmt: skip
+_RIPPLES = ("current_order_1", "current_order_2", "current_shaft", "current_sideband")
 _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage_sideband")
 
 # How well the reduced-order model knows what a fault does, ASSUMED from benches with another
@@ -125,12 +126,16 @@ _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage
 # A resolver off by an angle of d turns the drive's q axis by d: torque and EMF by its cosine, as
 # lost flux would; the current beside it, on the other axis, is in no log.
 #
+# A speed loop near its limit chatters in the reduced-order model, which has no sampled controller:
+# what that leaves at the orders of the current is no ripple of a drive.
+#
 # An encoder's gain is seen as the ratio of the two positions, and so is, with the other sign, a
 # resolver's. Whether it reaches the position loop depends on where the drive closes it, which no
 # healthy log tells.
 CANDIDATES: tuple[CandidateFault, ...] = (
     CandidateFault("backlash", "transmission", "rad", 0.0, 0.03, _BEARING, 0.01),
-    CandidateFault("friction", "transmission", "1", 0.0, 2.0, _BEARING / 3, 0.08),
+    CandidateFault("friction", "transmission", "1", 0.0, 2.0, _BEARING / 3, 0.08,
+                   amplified=("creeping_current",)),
     CandidateFault("lubrication", "transmission", "1", -0.7, 5.0, _BEARING / 3, 0.10),
     CandidateFault("short", _PHASES[0], "1", 0.0, 0.6, _MOTOR / 4, 0.10, _PHASES[1:]),
     CandidateFault("eccentricity_static", "motor", "1", 0.0, 0.6, _MOTOR / 4, 0.05),
@@ -143,7 +148,7 @@ CANDIDATES: tuple[CandidateFault, ...] = (
     CandidateFault("gain_drift", "control.position", "1", -0.4, 0.6, _SENSOR / 2, 0.003,
                    amplified=_AMPLIFIED["control.position"]),
     CandidateFault("gain_drift", "control.speed", "1", -0.5, 1.0, _SENSOR / 2, 0.05,
-                   amplified=_AMPLIFIED["control.speed"]),
+                   fixed_features=_RIPPLES, amplified=_AMPLIFIED["control.speed"]),
     CandidateFault("gain", "sensor.encoder", "1", -0.04, 0.04, _SENSOR, 0.01,
                    known_features=("position_scale",), either=True,
                    ambiguous=(("gain", "sensor.resolver"),)),

@@ -32,6 +32,7 @@ from elevon.diagnose.engine.explain import (
     unexplained,
 )
 from elevon.diagnose.engine.likelihood import Hypothesis
+from elevon.diagnose.engine.lookalikes import lookalike_findings, share_lookalikes
 from elevon.diagnose.engine.plausibility import SHARE, chance_of_any, weigh_plausibility
 from elevon.diagnose.engine.posterior import Posterior, posterior
 from elevon.diagnose.engine.spread import LearnedSpread
@@ -76,7 +77,7 @@ def answer_of(
     chance, faulty = _judged(detector, score, cases, rate, spread)
     few = len(seen) * (len(seen) - 1) // 2 <= _ALL
     result = _posterior_of(cases, seen, pairs=faulty or few, most=None if few else _MOST)
-    result = _with_plausibility(cases, seen, result)
+    result = share_lookalikes(cases, seen, _with_plausibility(cases, seen, result))
     best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
@@ -95,7 +96,11 @@ def answer_of(
         unobservable=blind,
         detectable=least,
         features=moved(cases, keys, values),
-        findings=(*(text for case in cases for text in case.findings), *findings),
+        findings=(
+            *(text for case in cases for text in case.findings),
+            *findings,
+            *(lookalike_findings(seen, result, keys) if status == "faulty" else ()),
+        ),
         seconds=clock.perf_counter() - begin,
         hypotheses=explanations(result, candidates) if status != MISFIT else (),
         alternatives=alternatives(result, cases, candidates, keys),

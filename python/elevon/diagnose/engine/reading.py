@@ -118,6 +118,10 @@ class Reading(ABC):
         """Return the same of units that run the test."""
         return [FeatureVector((), np.zeros(0), np.zeros(0)) for _ in units]
 
+    def lookalike_moves(self, key: str, severity: float) -> dict[str, float]:  # noqa: ARG002
+        """Return how far what looks like a candidate, ``KIND@PLACE``, moves plausible features."""
+        return {}
+
     @abstractmethod
     def digest(self) -> bytes:
         """Of all that its model runs depend on."""

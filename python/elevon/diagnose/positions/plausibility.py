@@ -49,6 +49,8 @@ PLAUSIBLE: FeatureTable = {
                 (0.3, 4e-3)),
         Feature("position_bend", "rad", "difference of the two positions by the stroke's square",
                 (0.0, 25e-3)),
+        Feature("position_cubic", "rad", "difference of the two positions by the stroke's cube",
+                (0.0, 50e-3)),
         Feature("position_rest", "rad", "scatter of the two positions' difference",
                 (0.2, 2.5e-3)),
         Feature("speed_offset", "rad/s", "logged speed beside the motor position's slope",
@@ -132,13 +134,14 @@ def _positions(log: Log, moving: Bools, ratio: float) -> dict[str, float]:
     place = log.output - float(np.mean(log.output[use]))
     stroke = float(np.ptp(place[use])) or 1.0
     columns = [np.sign(log.speed), place, np.ones_like(gap), *_pushing(log)]
-    rows = [gap, log.speed, (place / stroke) ** 2, *turn]
-    _, (left, speed, square, *waves) = _left(columns, rows, use)
+    rows = [gap, log.speed, (place / stroke) ** 2, (place / stroke) ** 3, *turn]
+    _, (left, speed, square, cube, *waves) = _left(columns, rows, use)
     sizes = np.linalg.lstsq(np.stack(waves, axis=1), left, rcond=None)[0]
     return {
         "position_lag": _along(speed, left),
         "position_shaft": float(np.hypot(*sizes)),
         "position_bend": _along(square, left),
+        "position_cubic": float(np.linalg.lstsq(np.stack([square, cube], axis=1), left)[0][1]),
         "position_rest": float(left.std()),
     }
 

@@ -128,6 +128,15 @@ class PositionReading(Reading):
         """Its features' records."""
         return BRAKE_UNKNOWN if self.log.brake.unknown else FEATURES
 
+    def lookalike_moves(self, key: str, severity: float) -> dict[str, float]:
+        """Return what an error once an output turn adds to the slope of a sensor's gain."""
+        sign = {"gain@sensor.encoder": 1.0, "gain@sensor.resolver": -1.0}.get(key)
+        if sign is None:
+            return {}
+        ratio = self.actuator.parameters.value("gear.ratio")
+        stroke = float(np.ptp(self.log.output[self.log.good]))
+        return {"position_cubic": sign * ratio * severity * stroke**3 / 6.0}
+
     def digest(self) -> bytes:
         """Of all in the log that its model runs depend on."""
         log = self.log
