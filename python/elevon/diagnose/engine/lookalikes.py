@@ -1,9 +1,9 @@
 """Causes that are no candidates and leave what a candidate leaves: their part of its probability.
 
-A log shows the lost motion, not whether play or a soft part winds up in it; over a short stroke an
-error once a turn of a gear is a straight line, as a sensor's gain is; and friction of another law
-than the model's is friction. What tells the two apart counts where the log shows it; where it does
-not, the candidate shares its probability with what is none.
+A log shows the lost motion, not whether it is backlash or the wind-up of a soft part. Over a short
+stroke an error once a turn of a gear is a straight line, as a sensor's gain is; and friction of
+another law than the model's is friction. What tells the two apart counts where the log shows it;
+where it does not, the candidate shares its probability with what is none.
 """
 
 from __future__ import annotations
