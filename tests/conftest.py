@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import gc
 import os
 import signal
 from collections.abc import Iterator
@@ -17,10 +18,21 @@ settings.register_profile("ci", parent=settings.get_profile("elevon"), derandomi
 settings.load_profile("ci" if os.environ.get("CI") else "elevon")
 
 
+# Each process of tests has a core of its own: threads that wait for each other on it only spin.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ["OMP_NUM_THREADS"] = "1"
+
+
 def pytest_configure() -> None:
     """Let Ctrl-C reach what the tests start: a shell's background job would hide it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was collected out of every later collection of garbage: it stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_report_header() -> str:

@@ -179,8 +179,11 @@ def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
         for factor in FACTORS:
             scaled = {other: numbers[other] * factor for other in alike}
             yield {other: value for other, value in scaled.items() if inside(known[other], value)}
+    # A limit acts only where the others of its kind leave it room.
+    alike = [other for other in moved if known[other].unit == known[path].unit != ""]
+    yield from ({other: value} for other in alike for value in moved[other])
     yield from _spoken_of(cell, path)
-    yield from ({other: value} for other, values in moved.items() for value in values)
+    yield from ({other: value} for other in moved if other not in alike for value in moved[other])
 
 
 def _words(cell: Cell, path: str) -> set[str]:

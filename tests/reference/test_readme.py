@@ -104,14 +104,12 @@ def test_demo_is_the_command_of_this_page():
     assert "elevon demo --out out/demo" in (ROOT / "Makefile").read_text("utf-8")
 
 
-def test_example(tmp_path):
+def test_example(tmp_path, monkeypatch, capsys):
     code, _ = _blocks("README.md", "python")
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("ok ")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("ok ")
     assert (tmp_path / "run.parquet").is_file()
 
 
@@ -175,19 +173,13 @@ def test_from_logs_to_an_answer(unit, tmp_path):
         "docs/how-to/python.md",
     ],
 )
-def test_examples_of_a_page(page, tmp_path):
+def test_examples_of_a_page(page, tmp_path, monkeypatch, capsys):
     """The Python of a page, block by block, in one process: as a reader would paste it."""
     blocks = _blocks(page, "python")
     assert blocks
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", "\n".join(blocks)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+    monkeypatch.chdir(tmp_path)
+    exec(compile("\n".join(blocks), page, "exec"), {"__name__": "__main__"})
+    assert capsys.readouterr().out
 
 
 @pytest.mark.long

@@ -44,14 +44,12 @@ def compare(
 
     if load is not None and not loads:
         raise InputError("--load needs --loads")
-
     page = None if out is None else out / "report.html"
     common.check_outputs([page], force=force)
     model = common.read_actuator(actuator, settings)
-    by_default = scenario is None
     run_scenario = default_scenario(model) if scenario is None else Scenario.load(scenario)
     run_scenario = run_scenario.with_faults(read_faults(fault, model.wiring))
-    start = default_start(model, run_scenario, default=by_default) if after is None else after
+    start = default_start(model, run_scenario, default=scenario is None) if after is None else after
     if faults_table:
         return _faults_table(model, run_scenario, start, seed)
     with progress_bar("comparing") as advance:

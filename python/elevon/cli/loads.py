@@ -53,12 +53,9 @@ def loads(
     check_output(out, force=force)
     model = Actuator.load(actuator)
     surface = HingeMoment(
-        area=parse_quantity(area, "m2", "--area"),
-        chord=parse_quantity(chord, "m", "--chord"),
-        c_0=c_0,
-        c_alpha=c_alpha,
-        c_delta=c_delta,
-    )
+        parse_quantity(area, "m2", "--area"), parse_quantity(chord, "m", "--chord"),
+        c_0, c_alpha, c_delta,
+    )  # fmt: skip
     with progress_bar("reading the flight") as advance:
         data = read_flight(flight, progress=advance)
     table = _table(

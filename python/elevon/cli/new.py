@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import typer
 
@@ -11,10 +10,6 @@ from elevon.cli.output import answer
 from elevon.cli.shell import Answer, command
 
 app = typer.Typer(rich_markup_mode=None)
-
-
-def _quantity(text: str) -> Any:
-    return typer.Option(metavar="QUANTITY", help=text)
 
 
 Text = str | None
@@ -63,12 +58,7 @@ def new(
         return _variant(path, base, force=force)
     wanted = New(path, numbers, linear, rotary, base, title, source)
     made = wanted.write(bench, force=force)
-    return Answer(made.data(), lambda: _print(made.lines()))
-
-
-def _print(lines: list[str]) -> None:
-    for line in lines:
-        answer(line)
+    return Answer(made.data(), lambda: answer(*made.lines()))
 
 
 def _variant(path: Path, base: str, *, force: bool) -> Answer:

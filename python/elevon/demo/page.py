@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from elevon.calibrate.validation import SIGNALS
 from elevon.calibrate.zeros import encoder_count
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from elevon.calibrate.validation import ValidationTrace
     from elevon.demo.run import Demo
+    from elevon.logs.importing import ImportedLog
+    from elevon.report.document import Section
 
 _DISPLAYED = {
     "encoder_position": ("encoder", 180.0 / math.pi, "deg"),
@@ -70,12 +72,10 @@ def _bench(report: Report, demo: Demo) -> None:
     section = report.section(
         "The bench",
         "The actuator, its output-side encoder, and a disk brake on the motor's shaft. The brake "
-        "is "
-        "closed by a servo in a torque loop on a load cell, which samples on a clock of its own. "
-        "The drive's trace holds what the drive's sensors show, at 400 Hz: no true position, no "
-        "true current, no command. When the command began, where in the backlash the motor stood, "
-        "the "
-        "cell's offset and its clock's error were left to chance.",
+        "is closed by a servo in a torque loop on a load cell, which samples on a clock of its "
+        "own. The drive's trace holds what the drive's sensors show, at 400 Hz: no true position, "
+        "no true current, no command. When the command began, where in the backlash the motor "
+        "stood, the cell's offset and its clock's error were left to chance.",
     )
     section.figure(
         bench_figure(),
@@ -93,18 +93,11 @@ def _bench(report: Report, demo: Demo) -> None:
         ]
         for k, log in enumerate(logs)
     ]
-    columns = [
-        "Log",
-        "Brake",
-        "Trigger at [s]",
-        "Command begins at [s]",
-        "Motor in the backlash [%]",
-    ]
+    columns = "Log", "Brake", "Trigger at [s]", "Command begins at [s]", "Motor in the backlash [%]"
     formats = ["", "", ".3f", ".3f", "+.0f"]
     caption = (
         "What chance set; the calibration was given none of it. Where the motor stands in the "
-        "backlash "
-        "at first: 0 is the middle, \N{PLUS-MINUS SIGN}50 its ends."
+        "backlash at first: 0 is the middle, \N{PLUS-MINUS SIGN}50 its ends."
     )
     section.table(ReportTable(columns, rows, caption, formats=formats))
 
@@ -123,15 +116,8 @@ def _agreement(report: Report, demo: Demo) -> None:
         before = old[e.log, e.signal]
         cells = [factor * before.rms, factor * e.rms, before.of_range, e.of_range]
         rows.append([e.log, label, unit, *cells])
-    columns = [
-        "Log",
-        "Signal",
-        "Unit",
-        "RMS before",
-        "RMS after",
-        "Of range, before [%]",
-        "after [%]",
-    ]
+    columns = ["Log", "Signal", "Unit", "RMS before", "RMS after", "Of range, before [%]",
+               "after [%]"]  # fmt: skip
     caption = "RMS of model less log, and the same in percent of the range of the logged signal."
     section.table(ReportTable(columns, rows, caption, digits=3))
     earlier = {trace.log: trace for trace in demo.before.traces}
@@ -142,16 +128,22 @@ def _agreement(report: Report, demo: Demo) -> None:
             "with the published values before and the calibrated ones after.",
         )
     held_out = demo.after.traces[-1]
+    _charts(section, held_out, earlier[held_out.log])
+
+
+def _charts(section: Section, trace: ValidationTrace, before: ValidationTrace) -> None:
+    """Draw the log that was kept back, to zoom in."""
     for name in ("motor_speed", "current_q_meas"):
         label, factor, unit = _DISPLAYED[name]
+        lines = {
+            "log": trace.measured[name],
+            "after": trace.simulated[name],
+            "before": before.simulated[name],
+        }
         section.chart(
-            f"{held_out.log}, the log kept back: {label}",
-            held_out.time[held_out.used],
-            {
-                "log": factor * held_out.measured[name][held_out.used],
-                "after": factor * held_out.simulated[name][held_out.used],
-                "before": factor * earlier[held_out.log].simulated[name][held_out.used],
-            },
+            f"{trace.log}, the log kept back: {label}",
+            trace.time[trace.used],
+            {key: factor * values[trace.used] for key, values in lines.items()},
             y_label=f"{label} [{unit}]",
             note="Point at it for numbers, drag to zoom, double click to go back.",
         )
@@ -191,26 +183,8 @@ def _clocks(report: Report, demo: Demo) -> None:
         "clock of its own. What both saw gives the offset, an instant on the drive's clock, and "
         "the drift, by which the cell's seconds are longer.",
     )
-    rows = []
-    for log, item in zip(demo.bench_truth["logs"], demo.imported, strict=True):
-        synchronisation = item.report.synchronisation
-        if not synchronisation or synchronisation.get("offset_s") is None:
-            continue
-        true = log["conditions"]
-        determined = all(finding.code != "drift-unknown" for finding in item.report.findings)
-        determined = determined and synchronisation["drift_std"] is not None
-        rows.append(
-            [
-                log["name"].replace("-", "\N{NON-BREAKING HYPHEN}"),
-                synchronisation["method"],
-                true["trigger"],
-                synchronisation["offset_s"],
-                1e3 * synchronisation["offset_std_s"],
-                1e6 * true["cell"]["clock_drift"],
-                1e6 * synchronisation["drift"] if determined else None,
-                1e6 * synchronisation["drift_std"] if determined else None,
-            ]
-        )
+    pairs = zip(demo.bench_truth["logs"], demo.imported, strict=True)
+    rows = [row for log, item in pairs if (row := _clock(log, item))]
     columns = [
         "Log", "Recovered from", "True offset [s]", "Recovered [s]", "Deviation [ms]",
         "True drift [ppm]", "Recovered [ppm]", "Deviation [ppm]",
@@ -227,13 +201,28 @@ def _clocks(report: Report, demo: Demo) -> None:
     )
 
 
+def _clock(log: dict[str, Any], item: ImportedLog) -> list[object]:
+    """Return a log's row; empty where the clocks were not brought together."""
+    clock, true = item.report.synchronisation, log["conditions"]
+    if not clock or clock.get("offset_s") is None:
+        return []
+    determined = clock["drift_std"] is not None and all(
+        finding.code != "drift-unknown" for finding in item.report.findings
+    )
+    drift = [1e6 * clock["drift"], 1e6 * clock["drift_std"]] if determined else [None, None]
+    return [
+        log["name"].replace("-", "\N{NON-BREAKING HYPHEN}"), clock["method"],
+        true["trigger"], clock["offset_s"], 1e3 * clock["offset_std_s"],
+        1e6 * true["cell"]["clock_drift"], *drift,
+    ]  # fmt: skip
+
+
 def _backlash(report: Report, demo: Demo) -> None:
     worst = max(demo.backlash.rows, key=lambda row: abs(row.error_deg) / row.limit_deg)
     section = report.section(
         "The published backlash table, recomputed",
         "Fifteen measured backlashes, put into the simulated actuator and recovered from its "
-        "encoder "
-        f"alone. Largest error against its limit: row {worst.measured.row}, "
+        f"encoder alone. Largest error against its limit: row {worst.measured.row}, "
         f"{abs(worst.error_deg):.4f} of {worst.limit_deg:.4f} deg. All rows and traces: "
         "backlash.html in this folder.",
     )

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +98,19 @@ def load_set(reference: str | os.PathLike[str], text: str | None = None) -> SetF
         The file cannot be read, has unknown keys or paths, wrong units or values outside their
         range, or lacks a parameter; the message names file, line, path and limit.
     """
-    path = find_set(reference) if text is None else Path(reference)
+    if text is not None:
+        return _loaded(Path(reference), text)
+    path = find_set(reference)
+    return _shipped(path) if is_shipped(path) else _loaded(path)
+
+
+@cache
+def _shipped(path: Path) -> SetFile:
+    """Read a file of the package once: it stays as it is while it is used."""
+    return _loaded(path)
+
+
+def _loaded(path: Path, text: str | None = None) -> SetFile:
     layers = list(_chain(path, text))
     wiring = next((layer.header.wiring for layer in layers if layer.header.wiring), None)
     top = layers[0]

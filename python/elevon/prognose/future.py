@@ -88,45 +88,83 @@ def look_ahead(
         Whether the severities' course is kept, which takes a sixth of the time; else it is where
         they stand now.
     """
-    count = len(units)
     off = _model_errors(process, units, model_error, rng)
-    load = usage.load * np.exp(usage.load_spread * rng.standard_normal(count))
-    end, first = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
-    damage = units.damage.copy()
-    alive = np.arange(count)
-    reserve, drivers = process.response.state(process.severity(units.damage), load)
-    reserve = reserve + off
-    dead = reserve.min(axis=0) < 0.0
-    end[dead], first[dead] = units.usage, reserve[:, dead].argmin(axis=0)
-    alive, reserve = alive[~dead], reserve[:, ~dead]
-    drivers = {name: x[~dead] for name, x in drivers.items()}
-    now = units.picked(np.flatnonzero(~dead))
-    at, courses = [units.usage], [_quantiles(process, damage)]
+    load = usage.load * np.exp(usage.load_spread * rng.standard_normal(len(units)))
+    fleet = _Fleet(process, units, load, off)
+    at, courses = [units.usage], [_quantiles(process, fleet.damage)]
     for number in range(_MOST_STEPS):
-        if not len(alive) or _out_of_sight(now.usage - units.usage, end - units.usage):
+        if fleet.done(units.usage):
             break
-        rate = process.rate(now, now.damage, load[alive], drivers)
-        step = _step(process, rate) * (1.0 if number else _FIRST)
-        later = process.advance(now, step, rng, load[alive], rate)
-        after, drivers = process.response.state(process.severity(later.damage), load[alive])
-        after = after + off[:, alive]
+        fleet.use(1.0 if number else _FIRST, rng)
+        if course and number % _COURSE == 0:
+            at.append(fleet.usage)
+            courses.append(_quantiles(process, fleet.damage))
+    if course and at[-1] < fleet.usage:
+        at.append(fleet.usage)
+        courses.append(_quantiles(process, fleet.damage))
+    return Future(units.usage, fleet.end, fleet.first, np.array(at), np.array(courses))
+
+
+class _Fleet:
+    """Units in use, and the ends of those that have failed.
+
+    Parameters
+    ----------
+    process, units
+        As in `look_ahead`.
+    load : ndarray, shape (n,)
+        Factor on the loads of each unit.
+    off : ndarray, shape (m, n)
+        Of `_model_errors`.
+    """
+
+    def __init__(self, process: Process, units: UnitPopulation, load: Floats, off: Floats) -> None:
+        count = len(units)
+        self.process, self.now, self._load, self._off = process, units, load, off
+        self.end, self.first = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
+        self.damage = units.damage.copy()
+        self._alive = np.arange(count)
+        reserve, self._drivers = self._state(units.damage)
+        failed = reserve.min(axis=0) < 0.0
+        self.end[failed], self.first[failed] = units.usage, reserve[:, failed].argmin(axis=0)
+        self._leave(failed, reserve)
+
+    @property
+    def usage(self) -> float:
+        """Of those that are still in use."""
+        return self.now.usage
+
+    def done(self, since: float) -> bool:
+        """Whether all have failed, or the rest has no end in sight."""
+        return not len(self._alive) or _out_of_sight(self.usage - since, self.end - since)
+
+    def use(self, share: float, rng: np.random.Generator) -> None:
+        """Go on by a share of the step that the growth of the fastest asks for."""
+        load, now = self._load[self._alive], self.now
+        rate = self.process.rate(now, now.damage, load, self._drivers)
+        step = _step(self.process, rate) * share
+        self.now = self.process.advance(now, step, rng, load, rate)
+        after, self._drivers = self._state(self.now.damage)
         failed = after.min(axis=0) < 0.0
         if failed.any():
-            share, which = crossing(reserve[:, failed], after[:, failed])
-            end[alive[failed]], first[alive[failed]] = now.usage + share * step, which
-        damage[alive] = later.damage
-        if course and number % _COURSE == 0:
-            at.append(later.usage)
-            courses.append(_quantiles(process, damage))
-        alive, reserve = alive[~failed], after[:, ~failed]
-        now = later
+            part, which = crossing(self._reserve[:, failed], after[:, failed])
+            gone = self._alive[failed]
+            self.end[gone], self.first[gone] = now.usage + part * step, which
+        self.damage[self._alive] = self.now.damage
+        self._leave(failed, after)
+
+    def _state(self, damage: Floats) -> tuple[Floats, dict[str, Floats]]:
+        """Return reserves, shape (m, a), and exposure of those that are still in use."""
+        severity = self.process.severity(damage)
+        reserve, drivers = self.process.response.state(severity, self._load[self._alive])
+        return reserve + self._off[:, self._alive], drivers
+
+    def _leave(self, failed: npt.NDArray[np.bool_], reserve: Floats) -> None:
+        """Take units that have failed out of use."""
+        self._alive, self._reserve = self._alive[~failed], reserve[:, ~failed]
         if failed.any():
-            now = later.picked(np.flatnonzero(~failed))
-            drivers = {name: x[~failed] for name, x in drivers.items()}
-    if course and at[-1] < now.usage:
-        at.append(now.usage)
-        courses.append(_quantiles(process, damage))
-    return Future(units.usage, end, first, np.array(at), np.array(courses))
+            self.now = self.now.picked(np.flatnonzero(~failed))
+            self._drivers = {name: x[~failed] for name, x in self._drivers.items()}
 
 
 def _model_errors(

@@ -57,10 +57,8 @@ def tabulate(
     base = mission.scenarios(known=actuator.parameters)
     requirements = mission.requirement
     plans = [_own_runs(item, base) for item in requirements]
-    output, load = _units(actuator)
-    faults = {law.key: law.unit for law in laws}
     _check_measures(actuator, requirements)
-    units = tuple(item.unit(output, load, faults) for item in requirements)
+    units = _units(actuator, requirements, laws)
     points = list(grid.points()) if points is None else points
     extra = [scenario for plan in plans for scenario in plan]
     # Requirements are judged at the loads as stated: elsewhere only the mission is run.
@@ -91,9 +89,7 @@ def tabulate(
 
 def _check_measures(actuator: Actuator, requirements: Sequence[Requirement]) -> None:
     """Refuse a requirement that the actuator's signals cannot show."""
-    from elevon import _core
-
-    units = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
+    units = _role_units(actuator)
     for item in requirements:
         needed = () if item.measure == SEVERITY else MEASURES[item.measure].roles
         lacking = next((role for role in needed if role not in units), None)
@@ -119,9 +115,7 @@ def _check_capability(actuator: Actuator, flown: RunSignals) -> None:
             f"the mission is outside the capability of {actuator.name}: the healthy unit trips at "
             f"{flown.time[-1]:.4g} s"
         )
-    from elevon import _core
-
-    units = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
+    units = _role_units(actuator)
     if units["command"] != units["output_position"]:
         return
     commanded, done = (float(np.ptp(flown[role])) for role in ("command", "output_position"))
@@ -221,12 +215,23 @@ def _scaled(term: Mapping[str, object], factor: float) -> dict[str, object]:
     return out
 
 
-def _units(actuator: Actuator) -> tuple[str, str]:
+def _units(
+    actuator: Actuator, requirements: Sequence[Requirement], laws: Sequence[Law]
+) -> tuple[str, ...]:
+    """Return the SI unit of each requirement's value."""
     from elevon import _core
 
-    names = {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
     ports = {p["name"]: p["unit"] for p in _core.ports(actuator.wiring)}
-    return names["output_position"], ports.get("output", "")
+    output, load = _role_units(actuator)["output_position"], ports.get("output", "")
+    faults = {law.key: law.unit for law in laws}
+    return tuple(item.unit(output, load, faults) for item in requirements)
+
+
+def _role_units(actuator: Actuator) -> dict[str | None, str]:
+    """Return the unit of each role's first signal."""
+    from elevon import _core
+
+    return {s["role"]: s["unit"] for s in reversed(_core.signals(actuator.wiring, "low"))}
 
 
 def _runs(

@@ -103,19 +103,19 @@ def chart(
         _line(name, line, selected, COLOURS[k % len(COLOURS)], dashed=name in dashed)
         for k, (name, line) in enumerate(drawn.items())
     ])  # fmt: skip
+    labels = (x_label, y_label)
     panel = {
-        "title": "", "label": [x_label, y_label], "log": [bool(logarithmic)] * 2, "limits": None,
+        "title": "", "label": labels, "log": [bool(logarithmic)] * 2, "limits": None,
         "ticks": [None, None], "height": int(height), "series": series,
         "shapes": [_stretch(k, item) for k, item in enumerate(shaded)],
     }  # fmt: skip
     fixed = drawing(
-        instants, values, COLOURS, labels=(x_label, y_label), height=height,
+        instants, values, COLOURS, labels=labels, height=height,
         logarithmic=logarithmic, dashed=dashed, shaded=shaded,
     )  # fmt: skip
     heading = f"<h3>{escape(title)}</h3>{fixed}"
-    return _element(
-        "section", heading, [panel], 1, f'<p class="note">{escape(note)}</p>' * bool(note)
-    )
+    below = f'<p class="note">{escape(note)}</p>' if note else ""
+    return _element("section", heading, [panel], 1, below)
 
 
 def figure(svg: str, panels: Sequence[Mapping[str, object]], columns: int, caption: str) -> str:

@@ -22,7 +22,7 @@ from elevon.session.start import SessionState, announced, fault_places, runs_of
 from elevon.session.values import Value, one_each, text, texts, whole_steps
 from elevon.simulate.acting import report
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike
-from elevon.simulate.prepare import Run, prepare, solver_step
+from elevon.simulate.prepare import Prepared, Run, prepare, solver_step
 from elevon.units import parse_quantity
 
 _FOREVER = 4.0e15  # solver steps: a session has no end of its own
@@ -104,10 +104,7 @@ class Session:
         self.many = not isinstance(actuator, (Actuator, str, os.PathLike))
         prepared = [prepare(run, fidelity, "output_position@every") for run in runs]
         report([item.notices for item in prepared], strict=False)
-        wirings = {item.actuator.wiring for item in prepared}
-        if len(wirings) > 1:
-            raise InputError(f"the runs of a session have one wiring; got {', '.join(wirings)}")
-        self.wiring, self.fidelity = wirings.pop(), fidelity
+        self.wiring, self.fidelity = _one_wiring(prepared), fidelity
         self.actuators = tuple(item.actuator for item in prepared)
         self._modes = [item.core["command_mode"] for item in prepared]
         self._units = [port_units(mode, self.wiring) for mode in self._modes]
@@ -393,3 +390,10 @@ class Session:
         except BaseException:
             self.restore(state)
             raise
+
+
+def _one_wiring(prepared: Sequence[Prepared]) -> str:
+    wirings = {item.actuator.wiring for item in prepared}
+    if len(wirings) > 1:
+        raise InputError(f"the runs of a session have one wiring; got {', '.join(wirings)}")
+    return wirings.pop()

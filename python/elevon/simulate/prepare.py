@@ -16,7 +16,7 @@ from elevon.parameters import records
 from elevon.parameters.records import wirings
 from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
-from elevon.scenario.compile import signal_units
+from elevon.scenario.compile import CompiledScenario, signal_units
 from elevon.simulate.acting import Notice, check_values, not_acting
 from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 from elevon.simulate.stroke import check_stroke
@@ -134,14 +134,34 @@ def prepare(
         step=step,
         pole_pairs=actuator.parameters.value("motor.pole_pairs"),
     )
-    if compiled.duration < step:
-        raise InputError(f"duration = {compiled.duration:g} s is shorter than a step ({step:g} s)")
-    if compiled.duration / step >= MOST_STEPS:
+    _check_duration(compiled.duration, step)
+    extra = 1 + len(compiled.faults)
+    rows = ((clock.samples(compiled.duration, step), len(clock.signals) + extra) for clock in plan)
+    return Prepared(
+        actuator,
+        _core_run(run, actuator, compiled),
+        plan,
+        step,
+        8 * sum(n * m for n, m in rows) + _RUN_BYTES,
+        compiled.command_unit,
+        (*findings, *(not_acting(actuator, compiled, fidelity) if notices else ())),
+        summed,
+    )
+
+
+def _check_duration(duration: float, step: float) -> None:
+    if duration < step:
+        raise InputError(f"duration = {duration:g} s is shorter than a step ({step:g} s)")
+    if duration / step >= MOST_STEPS:
         raise InputError(
-            f"duration = {compiled.duration:g} s is {compiled.duration / step:.3g} solver steps of "
-            f"{step:g} s; at most {MOST_STEPS:g}"
+            f"duration = {duration:g} s is {duration / step:.3g} solver steps of {step:g} s; "
+            f"at most {MOST_STEPS:g}"
         )
-    core = {
+
+
+def _core_run(run: Run, actuator: Actuator, compiled: CompiledScenario) -> dict[str, Any]:
+    """Return one run as the core takes it."""
+    return {
         "parameters": actuator.parameters.vector(),
         "inputs": compiled.inputs,
         "command_mode": compiled.command_mode,
@@ -151,18 +171,6 @@ def prepare(
         "seed": _whole(run.seed, "seed"),
         "run": _whole(run.number, "number"),
     }
-    extra = 1 + len(compiled.faults)
-    rows = ((clock.samples(compiled.duration, step), len(clock.signals) + extra) for clock in plan)
-    return Prepared(
-        actuator,
-        core,
-        plan,
-        step,
-        8 * sum(n * m for n, m in rows) + _RUN_BYTES,
-        compiled.command_unit,
-        (*findings, *(not_acting(actuator, compiled, fidelity) if notices else ())),
-        summed,
-    )
 
 
 @lru_cache(maxsize=256)
