@@ -9,11 +9,13 @@ from typing import Protocol
 
 from elevon.actuator import Actuator
 from elevon.calibrate.outcome import Calibration
-from elevon.calibrate.stages.choice import balanced, preloaded
+from elevon.calibrate.stages.log import MOTION
+from elevon.calibrate.stages.smooth import LOAD
 from elevon.calibrate.validation import Validation, validate
 from elevon.errors import ElevonError, InputError
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
+from elevon.parameters.records import records, wirings
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 
@@ -63,8 +65,6 @@ def way_of(logs: Sequence[Log], actuator: Actuator, *, validating: bool = False)
     InputError
         Logs that no way can read.
     """
-    from elevon.parameters.records import wirings
-
     if "position" not in wirings()[actuator.wiring]["modes"]:
         return _Balances(logs, unit=True)
     if not validating and preloaded(actuator) and balanced(logs):
@@ -95,9 +95,23 @@ def _check_rates(logs: Sequence[Log]) -> None:
             )
 
 
+def preloaded(actuator: Actuator) -> bool:
+    """Whether the actuator has a preloaded screw with an efficiency in each direction."""
+    return {"screw.preload", "screw.efficiency_aiding"} <= records(actuator.wiring).keys()
+
+
+def balanced(logs: Sequence[Log]) -> bool:
+    """Whether the balances suit: torque, motion and load in every log."""
+    return all(
+        log.has("torque_current")
+        and any(log.has(role) for role in MOTION)
+        and any(log.has(role) for role in LOAD)
+        for log in logs
+    )
+
+
 def turns(actuator: Actuator) -> bool:
     """Whether the actuator is a servo whose output turns: its positions give the backlash."""
-    from elevon.parameters.records import wirings
     from elevon.scenario.compile import signal_records
 
     position = signal_records(actuator.wiring, "high").get("output_position")

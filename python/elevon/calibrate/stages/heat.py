@@ -19,6 +19,7 @@ from elevon.calibrate.stages.screw import nut_force, nut_loss
 from elevon.calibrate.stages.smooth import loaded
 from elevon.estimate import Determined, Estimate, Free
 from elevon.estimate.residual import BalanceFit, fit_balance
+from elevon.logs.drive import group_means
 from elevon.logs.log import Log
 
 _COPPER = 0.05  # of a resistance from a datasheet
@@ -49,9 +50,12 @@ class _Bins:
     heat: Floats  # W at the reference temperature, or of the nut
     surface: Floats
 
-
-def _means(values: Floats, count: int, size: int) -> Floats:
-    return np.asarray(values[: count * size].reshape(count, size).mean(axis=1))
+    @classmethod
+    def of(cls, log: Log, heat: Floats, role: str) -> _Bins:
+        """Average a log's heat and a temperature."""
+        size = max(1, round(_BIN / log.period))
+        time, means, warm = (group_means(values, size) for values in (log.time, heat, log[role]))
+        return cls(time, size * log.period, means, warm)
 
 
 def heat(ctx: Context) -> None:
@@ -69,12 +73,11 @@ def motor_heat(logs: Sequence[Log], actuator: Actuator, resistance: Estimate) ->
     `resistance` is the winding's at the reference temperature, with what is not known of it.
     """
     flux = "motor.flux_temperature_coefficient"
-    usable = [log for log in logs if log.has("surface_temperature", "torque_current")]
-    usable = [log for log in usable if _rise(log["surface_temperature"], log) > _RISE]
-    if not usable:
+    usable = [log for log in logs if log.has("torque_current")]
+    log = _longest(usable, "surface_temperature")
+    if log is None:
         why = "no log in which the housing's temperature changes"
         return {}, dict.fromkeys((*MOTOR, flux), why)
-    log = max(usable, key=lambda item: item.duration)
     windows = _windows(log)
     fit = _motor_fit(log, windows, actuator, resistance.value)
     levels, reasons = fit.judged(lambda _path: _TOO_COOL, MOTOR)
@@ -91,8 +94,13 @@ def motor_heat(logs: Sequence[Log], actuator: Actuator, resistance: Estimate) ->
 
 def _rise(values: Floats, log: Log) -> float:
     size = max(1, round(10.0 * _BIN / log.period))
-    count = len(values) // size
-    return float(np.ptp(_means(values, count, size))) if count > 2 else 0.0
+    return float(np.ptp(group_means(values, size))) if len(values) // size > 2 else 0.0
+
+
+def _longest(logs: Sequence[Log], role: str) -> Log | None:
+    """Return the longest log in which a temperature changes."""
+    usable = [log for log in logs if log.has(role) and _rise(log[role], log) > _RISE]
+    return max(usable, key=lambda item: item.duration, default=None)
 
 
 @dataclass(frozen=True)
@@ -152,11 +160,7 @@ def _motor_fit(
     log: Log, windows: _Windows | None, actuator: Actuator, resistance: float
 ) -> BalanceFit:
     value = actuator.parameters.value
-    size = max(1, round(_BIN / log.period))
-    count = len(log.time) // size
-    heat = 1.5 * resistance * _means(_square(log), count, size)
-    bins = _Bins(_means(log.time, count, size), size * log.period, heat,
-                 _means(log["surface_temperature"], count, size))  # fmt: skip
+    bins = _Bins.of(log, 1.5 * resistance * _square(log), "surface_temperature")
     noise = _spread(bins.surface)
     readings, weight = np.empty(0), 0.0
     if windows is not None:
@@ -177,7 +181,7 @@ def _motor_fit(
         warm += values[-1] - value("motor.reference_temperature")
         return np.concatenate([sensed, weight * warm])
 
-    strokes = [(bins.time, np.ones(count), bins.step)]
+    strokes = [(bins.time, np.ones(len(bins.time)), bins.step)]
     if windows is not None:
         strokes.append((windows.time, np.ones(len(windows.time)), _WINDOW))
     return fit_balance(free, data, model, strokes, scale=noise)
@@ -226,9 +230,8 @@ def _network(bins: _Bins, values: Floats, actuator: Actuator) -> tuple[Floats, F
         power = heat * (1.0 + warmth * (winding + apart))
         hot = surface + ambient
         out = convection * area * surface + radiation * (hot**4 - ambient**4)
-        flow = (winding - surface + h * (0.5 * power / capacity + 0.5 * out / housing)) / (
-            1 + a + b
-        )
+        apart_by = winding - surface + h * (0.5 * power / capacity + 0.5 * out / housing)
+        flow = apart_by / (1 + a + b)
         before = surface
         winding += h * power / capacity - 2.0 * a * flow
         surface += 2.0 * b * flow - h * out / housing
@@ -242,19 +245,14 @@ def nut_heat(logs: Sequence[Log], actuator: Actuator, known: Mapping[str, Estima
 
     `known` are levels of what makes the heat: the efficiencies and the preload.
     """
-    usable = [log for log in logs if log.has("nut_temperature") and loaded(log)]
-    usable = [log for log in usable if _rise(log["nut_temperature"], log) > _RISE]
-    if not usable:
+    log = _longest([log for log in logs if loaded(log)], "nut_temperature")
+    if log is None:
         return {}, dict.fromkeys(NUT, "no log in which the nut's temperature changes")
-    log = max(usable, key=lambda item: item.duration)
     value = actuator.parameters.value
-    size = max(1, round(_BIN / log.period))
-    count = len(log.time) // size
     force = nut_force(log, actuator)
     loss = value("screw.nut_heat_share") * nut_loss(log["motor_speed"], force, actuator)
-    bins = _Bins(_means(log.time, count, size), size * log.period, _means(loss, count, size),
-                 _means(log["nut_temperature"], count, size))  # fmt: skip
-    strokes = [(bins.time, np.ones(count), bins.step)]
+    bins = _Bins.of(log, loss, "nut_temperature")
+    strokes = [(bins.time, np.ones(len(bins.time)), bins.step)]
     data, free = bins.surface - value("thermal.ambient"), _believed(NUT, actuator)
     fit = fit_balance(free, data, _single(bins), strokes, scale=_spread(bins.surface))
     levels, reasons = fit.judged(lambda _path: _TOO_COOL, NUT)
@@ -288,9 +286,8 @@ def _single(bins: _Bins) -> Callable[[Floats], Floats]:
 
         capacity, resistance, lag, start = values
         decay = np.exp(-bins.step / (capacity * resistance))
-        warm = lfilter([resistance * (1.0 - decay)], [1.0, -decay], bins.heat, zi=[decay * start])[
-            0
-        ]
+        gain = resistance * (1.0 - decay)
+        warm = lfilter([gain], [1.0, -decay], bins.heat, zi=[decay * start])[0]
         middle = 0.5 * (warm + np.concatenate(([start], warm[:-1])))
         share = 1.0 - np.exp(-bins.step / max(float(lag), 1e-3))
         late = lfilter([share], [1.0, share - 1.0], middle, zi=[(1.0 - share) * start])[0]

@@ -65,35 +65,40 @@ def friction_knots(
     tests: Sequence[RigTest], actuator: Actuator, mass: Estimate
 ) -> tuple[Knot, dict[str, str]]:
     """Return the knots of both tables that the tests determine, and why the others are not."""
-    determined: Knot = {}
-    reasons: dict[str, str] = {}
+    rows = []
     for kind in ("ff", "ffm"):
         for name, direction in (("extension", 1.0), ("retraction", -1.0)):
             mine = [t for t in tests if t.kind == kind and t.direction == direction]
-            forces = np.array([t.direction * (t.level + mass.value * GRAVITY) for t in mine])
-            deviation = np.array([np.hypot(t.level_std, _SHAPE * abs(t.level)) for t in mine])
-            paths = [f"friction.{kind}_{name}_{k}" for k in range(1, KNOTS + 1)]
-            levels, missing = _table(paths, mine, forces, deviation, actuator)
-            # The mass moves a whole table.
-            weight = mass.std * GRAVITY
-            determined |= {
-                path: Estimate(item.value, float(np.hypot(item.std, weight)), mass.degrees)
-                for path, item in levels.items()
-            }
-            reasons |= missing
-    return determined, reasons
+            forces = [t.direction * (t.level + mass.value * GRAVITY) for t in mine]
+            deviations = [np.hypot(t.level_std, _SHAPE * abs(t.level)) for t in mine]
+            rows.append((f"friction.{kind}_{name}", mine, forces, deviations))
+    levels, reasons = _tables(rows, actuator)
+    weight = mass.std * GRAVITY  # the mass moves a whole table
+    return {
+        path: Estimate(item.value, float(np.hypot(item.std, weight)), mass.degrees)
+        for path, item in levels.items()
+    }, reasons
 
 
 def harmonic_knots(tests: Sequence[RigTest], actuator: Actuator) -> tuple[Knot, dict[str, str]]:
     """Return the knots of the harmonics that the tests determine, and why not the others."""
+    mine, rows = [t for t in tests if t.kind in ("ff", "ffm")], []
+    for n in range(1, HARMONICS + 1):
+        amplitudes = [t.harmonics[n - 1] for t in mine]
+        deviations = [np.hypot(t.harmonics_std[n - 1], 0.02) for t in mine]
+        rows.append((f"friction.harmonic_{n}", mine, amplitudes, deviations))
+    return _tables(rows, actuator)
+
+
+def _tables(
+    rows: Sequence[tuple[str, Sequence[RigTest], list[float], list[float]]], actuator: Actuator
+) -> tuple[Knot, dict[str, str]]:
+    """Return the knots of tables: of each its name, tests, values, deviations."""
     determined: Knot = {}
     reasons: dict[str, str] = {}
-    mine = [t for t in tests if t.kind in ("ff", "ffm")]
-    for n in range(1, HARMONICS + 1):
-        amplitude = np.array([t.harmonics[n - 1] for t in mine])
-        deviation = np.array([np.hypot(t.harmonics_std[n - 1], 0.02) for t in mine])
-        paths = [f"friction.harmonic_{n}_{k}" for k in range(1, KNOTS + 1)]
-        levels, missing = _table(paths, mine, amplitude, deviation, actuator)
+    for name, tests, values, deviations in rows:
+        paths = [f"{name}_{k}" for k in range(1, KNOTS + 1)]
+        levels, missing = _table(paths, tests, np.array(values), np.array(deviations), actuator)
         determined |= levels
         reasons |= missing
     return determined, reasons

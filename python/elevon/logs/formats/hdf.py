@@ -9,57 +9,29 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from elevon.arrays import Floats
 from elevon.containers.hdf import array, datasets, opened, text_attribute
 from elevon.errors import quoted
 from elevon.logs.formats.limits import Limits
-from elevon.logs.formats.vectors import columns_of, signals_side_by_side
+from elevon.logs.formats.vectors import Vectors, signals_side_by_side
 
 
-def numeric_vectors(
-    path: Path, limits: Limits
-) -> tuple[dict[str, Floats], dict[str, str], list[str]]:
-    """Read every vector of numbers of an HDF5 file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    limits : Limits
-        Bounds, applied to the declared sizes before anything is read.
-
-    Returns
-    -------
-    vectors : dict of str to ndarray, shape (n,)
-        By path within the file, groups joined by ``/``.
-    units : dict of str to str
-        The text attribute ``units`` of each vector that has one.
-    notes : list of str
-        What was passed over, and why.
+def numeric_vectors(path: Path, limits: Limits) -> Vectors:
+    """Return all vectors of numbers of an HDF5 file, with their units.
 
     Raises
     ------
     FormatError
-        Damaged file, or content larger than the limits.
+        A damaged file, or one beyond the limits.
     """
-    vectors: dict[str, Floats] = {}
-    units: dict[str, str] = {}
-    notes: list[str] = []
+    found = Vectors(str(path), limits)
     with opened(path) as file:
-        total = 0
         for name, data in datasets(file):
-            values = data if isinstance(data, str) else _array(path, name, data, limits, total)
+            values = data if isinstance(data, str) else _array(path, name, data, limits, found.size)
             if isinstance(values, str):
-                notes.append(f"{quoted(name)} passed over: {values}")
-                continue
-            total += values.size
-            numbers = values.astype(np.float64)
-            unit = text_attribute(data, "units")
-            several = signals_side_by_side(numbers.shape)
-            signals = columns_of(name, numbers) if several else {name: numbers.reshape(-1)}
-            vectors.update(signals)
-            units.update(dict.fromkeys(signals, unit) if unit else {})
-    return vectors, units, notes
+                found.pass_over(name, values)
+            else:
+                found.add(name, values.astype(np.float64), text_attribute(data, "units"))
+    return found
 
 
 def _array(

@@ -13,7 +13,7 @@ from elevon.errors import FormatError, quoted
 from elevon.logs.formats.hdf import numeric_vectors
 from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
 from elevon.logs.formats.table import RawTable
-from elevon.logs.formats.vectors import columns_of, signals_side_by_side, table_of_vectors
+from elevon.logs.formats.vectors import Vectors, signals_side_by_side
 
 
 def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
@@ -29,10 +29,16 @@ def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTabl
     """
     file = existing_file(path, limits)
     if is_hdf5(file):
-        vectors, _, notes = numeric_vectors(file, limits)
-        return table_of_vectors(str(file), vectors, {}, notes, file_format="mat 7.3", limits=limits)
-    vectors, notes = _vectors(file, limits)
-    return table_of_vectors(str(file), vectors, {}, notes, file_format="mat 5", limits=limits)
+        return numeric_vectors(file, limits).table("mat 7.3")
+    found = Vectors(str(file), limits)
+    for variable in _bounded(file, limits):
+        for label, item in _members(file, variable):
+            numbers = _numbers(item)
+            if isinstance(numbers, str):
+                found.pass_over(label, numbers)
+            else:
+                found.add(label, numbers)
+    return found.table("mat 5")
 
 
 def has_variable(path: Path, name: str, limits: Limits) -> bool:
@@ -48,30 +54,6 @@ def _bounded(path: Path, limits: Limits) -> Generator[Variable, None, None]:
     return variables(path, lambda size: limits.check_bytes(str(path), size))
 
 
-def _vectors(path: Path, limits: Limits) -> tuple[dict[str, Floats], list[str]]:
-    """Return the numeric vectors of a version 5 file; those inside a structure as ``name/field``.
-
-    Columns of a long matrix are vectors. The notes name what is passed over: cells, objects, text,
-    complex numbers.
-    """
-    vectors: dict[str, Floats] = {}
-    notes = []
-    total = 0
-    for variable in _bounded(path, limits):
-        for label, item in _members(path, variable):
-            columns = _columns(label, item)
-            if isinstance(columns, str):
-                notes.append(f"{quoted(label)} passed over: {columns}")
-                continue
-            for name, vector in columns.items():
-                if name in vectors:
-                    raise FormatError(f"{path}: two variables are named {quoted(name)}")
-                total += len(vector)
-                limits.check_shape(str(path), total, 1)
-                vectors[name] = vector
-    return vectors, notes
-
-
 def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
     """Yield the variable itself, or the fields of a structure."""
     if variable.kind != "struct":
@@ -85,13 +67,14 @@ def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
         yield f"{variable.name}/{field.name}", field
 
 
-def _columns(label: str, item: Variable) -> dict[str, Floats] | str:
-    """Decode a vector, or the columns of a long matrix; of anything else say what it is."""
-    reason = "" if item.kind == "numbers" else item.kind
-    if not reason and item.is_complex:
-        reason = "complex numbers"
-    if not reason and signals_side_by_side(item.shape):
-        return columns_of(label, item.numbers().reshape(item.shape, order="F"))
-    if not reason and sum(length != 1 for length in item.shape) > 1:
-        reason = f"neither a vector nor signals side by side, shape {item.shape}"
-    return reason or {label: item.numbers()}
+def _numbers(item: Variable) -> Floats | str:
+    """Return a vector, or signals side by side; a text: why it is neither."""
+    if item.kind != "numbers":
+        return item.kind
+    if item.is_complex:
+        return "complex numbers"
+    if signals_side_by_side(item.shape):
+        return item.numbers().reshape(item.shape, order="F")
+    if sum(length != 1 for length in item.shape) > 1:
+        return f"neither a vector nor signals side by side, shape {item.shape}"
+    return item.numbers()

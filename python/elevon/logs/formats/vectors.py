@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,43 +18,81 @@ _MOST_SIGNALS, _ROWS = 64, 10
 _TIMES = ("xms", "time", "t", "time_s", "time_ms", "timems", "x")
 
 
-def table_of_vectors(
-    source: str,
-    vectors: Mapping[str, Floats],
-    units: Mapping[str, str],
-    notes: Sequence[str],
-    *,
-    file_format: str,
-    limits: Limits,
-) -> RawTable:
-    """Return the vectors that share the time vector's length; the others are named in the notes.
+@dataclass
+class Vectors:
+    """Vectors of numbers as a file holds them; those of one length become its table.
 
-    Group names are dropped where the last part of the path is unique.
-
-    Raises
-    ------
-    FormatError
-        No vector, or more than the limits allow.
+    Attributes
+    ----------
+    source : str
+        The file.
+    limits : Limits
+        Bounds on size.
+    values : dict of str to ndarray
+        The vectors, by name; the length that the time has, or else the longest, is the table's.
+    units : dict of str to str
+        Units that the file states.
+    notes : list of str
+        What was passed over.
+    size : int
+        Numbers so far.
     """
-    if not vectors:
-        raise FormatError(f"{source}: no vector of numbers")
-    length = _length(vectors)
-    if length == 0:
-        raise FormatError(f"{source}: the vectors are empty")
-    aligned = {name: quiet(values) for name, values in vectors.items() if len(values) == length}
-    others = [
-        f"{quoted(name)} passed over: {len(vectors[name])} values, not {length}"
-        for name in vectors.keys() - aligned.keys()
-    ]
-    limits.check_shape(source, length, len(aligned))
-    last = [name.rpartition("/")[2] for name in aligned]
-    short = {
-        name: tail if last.count(tail) == 1 else name
-        for name, tail in zip(aligned, last, strict=True)
-    }
-    columns = {short[name]: values for name, values in aligned.items()}
-    stated = {short[name]: unit for name, unit in units.items() if name in aligned}
-    return RawTable(source, columns, stated, (*notes, *others), file_format)
+
+    source: str
+    limits: Limits
+    values: dict[str, Floats] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    size: int = 0
+
+    def pass_over(self, name: str, why: str) -> None:
+        """Note what is no vector of numbers."""
+        self.notes.append(f"{quoted(name)} passed over: {why}")
+
+    def add(self, name: str, numbers: Floats, unit: str = "") -> None:
+        """Add a vector, or signals side by side.
+
+        Raises
+        ------
+        FormatError
+            A name that is there, or more numbers than the limits allow.
+        """
+        several = signals_side_by_side(numbers.shape)
+        signals = columns_of(name, numbers) if several else {name: numbers.reshape(-1)}
+        for label, vector in signals.items():
+            if label in self.values:
+                raise FormatError(f"{self.source}: two variables are named {quoted(label)}")
+            self.size += len(vector)
+            self.limits.check_shape(self.source, self.size, 1)
+            self.values[label] = vector
+            if unit:
+                self.units[label] = unit
+
+    def table(self, file_format: str) -> RawTable:
+        """Return the vectors of one length as a table.
+
+        Raises
+        ------
+        FormatError
+            No vector, or empty ones.
+        """
+        if not self.values:
+            raise FormatError(f"{self.source}: no vector of numbers")
+        length = _length(self.values)
+        if length == 0:
+            raise FormatError(f"{self.source}: the vectors are empty")
+        aligned = {n: quiet(values) for n, values in self.values.items() if len(values) == length}
+        for name in self.values.keys() - aligned.keys():
+            self.pass_over(name, f"{len(self.values[name])} values, not {length}")
+        self.limits.check_shape(self.source, length, len(aligned))
+        last = [name.rpartition("/")[2] for name in aligned]
+        short = {
+            name: tail if last.count(tail) == 1 else name
+            for name, tail in zip(aligned, last, strict=True)
+        }
+        columns = {short[name]: values for name, values in aligned.items()}
+        stated = {short[name]: unit for name, unit in self.units.items() if name in aligned}
+        return RawTable(self.source, columns, stated, tuple(self.notes), file_format)
 
 
 def signals_side_by_side(shape: Sequence[int]) -> bool:

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.arrays import Floats
+from elevon.data import packaged_toml
 from elevon.errors import FormatError, quoted
 from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.agreement import evened, slope_and_fit
-from elevon.logs.maps.guess_column import GuessedColumn
-from elevon.logs.maps.hints import role_hint, unit_hint
+from elevon.logs.maps.hints import GuessedColumn, role_hint, unit_hint
 from elevon.logs.maps.motion import MotionColumns, find_motion
 from elevon.logs.maps.signals import known_roles
 from elevon.logs.maps.time_unit import TIME_UNITS, settle_time_unit
@@ -26,12 +26,7 @@ _EVEN = 0.25  # of the columns that rise, the one whose steps scatter least is t
 _MOVES = 0.05  # of a clock's steps, at least, are no repetition: a command that steps is no clock
 _CURRENT = 0.2  # share of a column that acceleration, friction and speed must explain
 _PHASE = "current_a"
-_DEFAULT_UNITS = {
-    "torque_current": "A", "current_ref": "A", "direct_current": "A", "supply_current": "A",
-    "current_a": "A", "current_b": "A", "current_c": "A", "torque_voltage": "V",
-    "supply_voltage": "V", "load_cell": "N", "temperature": "degC", "vibration": "m/s2",
-    "speed_ref": "rpm",
-}  # fmt: skip
+_DEFAULT_UNITS = packaged_toml("elevon.logs", "hints.toml")["default_units"]
 
 
 @dataclass(frozen=True, slots=True)

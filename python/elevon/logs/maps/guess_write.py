@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from elevon.logs.maps.guess import Guess
-from elevon.logs.maps.guess_column import GuessedColumn
+from elevon.logs.maps.hints import GuessedColumn
 
 _HEAD = """# A first map of {source}: guessed, to be read and corrected.
 # Roles: `role`; what is wrong is refused at the import where the data contradict it.

@@ -3,35 +3,30 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from elevon.data import packaged_toml
 from elevon.errors import InputError
 from elevon.logs.maps.columns import drive_columns, parameter_key
 from elevon.logs.maps.signals import known_roles, known_signals
 from elevon.units import parse_unit
 
 _TIME = re.compile(r"^(x?ms|x|t|t_?ms|t_?s|zeit.*|.*time.*|.*timestamp.*|seconds?|sec)$")
-_WANTED = re.compile(r"demand|command|cmd|set_?p|setpoint|target|desired|ref|soll|_set$|_dem$|_sp$")
-_MOTOR = re.compile(r"motor|resolver|fast|rotor|_m$|^m_")
-_SPEED = re.compile(r"speed|veloc|rpm|omega|drehzahl|^n$|^v$|^w$|_vel|geschw")
-_CURRENT = re.compile(r"curr|amp(ere)?s?$|^i$|^i_?[abcdq]\b|^i_?(q|d)|strom|_i$")
-_VOLTAGE = re.compile(r"volt|^u$|^u_|spannung|vbus|v_?dc")
-_TEMPERATURE = re.compile(r"temp|thermo")
-_FORCE = re.compile(r"force|load|kraft|torque|cell|moment")
-_VIBRATION = re.compile(r"acc|vib")
-_POSITION = re.compile(
-    r"pos|angle|displ|stroke|travel|encoder|resolver|lvdt|^x$|^s$|weg|lage|actual"
-)
-_SUPPLY = re.compile(r"supply|bus|link|dc|source|batt")
-_PHASE = re.compile(r"(?:^|_|phase)([abc])(?:$|_)")
-_SUFFIXES = {
-    "mm": "mm", "cm": "cm", "um": "um", "m": "m", "ms": "ms", "us": "us", "s": "s", "sec": "s",
-    "deg": "deg", "rad": "rad", "rev": "rev", "rpm": "rpm", "a": "A", "ma": "mA", "v": "V",
-    "n": "N", "kn": "kN", "nm": "N m", "degc": "degC", "mms": "mm/s", "mmps": "mm/s",
-    "rads": "rad/s", "radps": "rad/s", "kgf": "kgf", "hz": "Hz",
-}  # fmt: skip
-#: What stands before a last word `s` and makes a speed of it: ``speed_mm_s``.
+_HINTS = packaged_toml("elevon.logs", "hints.toml")
+_SUFFIXES: Mapping[str, str] = _HINTS["suffixes"]
 _PER_SECOND = frozenset({"mm", "cm", "m", "rad", "deg", "rev"})
+
+
+@dataclass(slots=True)
+class GuessedColumn:
+    """A column: its role and its unit, where they are known, and why."""
+
+    name: str
+    role: str | None = None
+    unit: str | None = None
+    sign: int = 1
+    reasons: list[str] = field(default_factory=list)
 
 
 def role_hint(header: str) -> str:
@@ -61,48 +56,8 @@ def _without_unit(header: str) -> str:
 
 
 def _by_words(text: str) -> str:
-    wanted = bool(_WANTED.search(text))
-    for words, role in _KINDS:
-        if words.search(text):
-            return role(text, wanted)
-    return "command" if wanted else ""
-
-
-def _voltage(text: str, _wanted: bool) -> str:
-    return "supply_voltage" if _SUPPLY.search(text) else "torque_voltage"
-
-
-def _speed(_text: str, wanted: bool) -> str:
-    return "speed_ref" if wanted else "motor_speed"
-
-
-def _position(text: str, wanted: bool) -> str:
-    if wanted:
-        return "command"
-    return "motor_position" if _MOTOR.search(text) else "output_position"
-
-
-def _current(text: str, wanted: bool) -> str:
-    if wanted:
-        return "current_ref"
-    if _SUPPLY.search(text):
-        return "supply_current"
-    phase = _PHASE.search(text)
-    if phase is not None:
-        return f"current_{phase.group(1)}"
-    return "direct_current" if re.search(r"i_?d(_|$)|direct|field", text) else "torque_current"
-
-
-#: Words of a header and what they suggest, the first that stand in it.
-_KINDS: tuple[tuple[re.Pattern[str], Callable[[str, bool], str]], ...] = (
-    (_TEMPERATURE, lambda _text, _wanted: "temperature"),
-    (_CURRENT, _current),
-    (_VOLTAGE, _voltage),
-    (_SPEED, _speed),
-    (_POSITION, _position),
-    (_FORCE, lambda _text, _wanted: "load_cell"),
-    (_VIBRATION, lambda _text, _wanted: "vibration"),
-)
+    said = {name for name, words in _HINTS["words"].items() if re.search(words, text)}
+    return next((role for role, *words in _HINTS["rules"]["all"] if said.issuperset(words)), "")
 
 
 def unit_hint(header: str, stated: str) -> str:

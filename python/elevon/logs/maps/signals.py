@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
+from elevon.data import packaged_toml
 from elevon.errors import InputError
 from elevon.units import parse_unit
 
@@ -26,23 +27,9 @@ class LogSignal:
     role: str = ""
 
 
-_SHAFTS = {
-    "command": ("slow", "angle"),
-    "output_position": ("slow", "angle"),
-    "output_speed": ("slow", "angle"),
-    "motor_position": ("fast", "angle"),
-    "motor_speed": ("fast", "angle"),
-    "speed_ref": ("fast", "angle"),
-}
+_TABLES = packaged_toml("elevon.logs", "hints.toml")
 _TORQUES = ("motor_torque", "brake_torque", "load_torque")  # on the motor shaft
 _OF_THE_DRIVE = ("current_ref", "torque_current", "direct_current", "torque_voltage")
-_OF_LOGS = {  # channels that only logs have
-    "position_ref": "command",
-    "position": "output_position",
-    "load_cell_force": "load_cell",
-    "load_cell_torque": "load_cell",
-    "trigger": "trigger",
-}
 
 
 @lru_cache(maxsize=1)
@@ -53,7 +40,8 @@ def known_roles() -> Mapping[str, LogSignal]:
     roles = {
         role["name"]: LogSignal(
             tuple(role["units"]),
-            *_SHAFTS.get(role["name"], ("", "")),
+            _TABLES["shafts"].get(role["name"], ""),
+            "angle" if role["name"] in _TABLES["shafts"] else "",
             role["name"] in _OF_THE_DRIVE,
             role["name"],
         )
@@ -74,7 +62,7 @@ def known_signals() -> Mapping[str, LogSignal]:
                 torque = ("fast", "torque") if item["name"] in _TORQUES else ("", "")
                 plain = LogSignal((item["unit"] or "1",), *torque)
                 known.setdefault(item["name"], roles.get(item["role"] or "", plain))
-    return known | {name: roles[role] for name, role in _OF_LOGS.items()}
+    return known | {name: roles[role] for name, role in _TABLES["of_logs"].items()}
 
 
 def unit_among(units: tuple[str, ...], stated: str | None, place: str) -> str:

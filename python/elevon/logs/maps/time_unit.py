@@ -9,8 +9,7 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.agreement import evened, slope_and_fit
-from elevon.logs.maps.guess_column import GuessedColumn
-from elevon.logs.maps.hints import role_hint
+from elevon.logs.maps.hints import GuessedColumn, role_hint
 from elevon.units import Unit, parse_unit
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from elevon.actuator import Actuator
-from elevon.calibrate.stages.closed_loop.log import NAMES, recorded_roles, sigma, unsigned
+from elevon.calibrate.stages.closed_loop.log import CHANNELS, NAMES, recorded_roles, sigma, unsigned
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.data import packaged_toml
 from elevon.errors import unknown
@@ -99,8 +99,6 @@ def _current_loop(actuator: Actuator) -> list[Free]:
 def _logger_rows(logs: Sequence[Log], channels: set[str]) -> list[Free]:
     period = max(log.period for log in logs)
     late = max(1.5 * period, 2e-3)
-    units = {"position": "", "motor_position": "rad", "speed": "", "motor_speed": "rad/s",
-             "current": "A", "voltage": "V"}  # fmt: skip
     rows = []
     for name in sorted(channels):
         rows.append(Free(f"sensor.{name}_delay", 0.5 * period, late, -late, 20.0 * late, *_SECONDS))
@@ -113,7 +111,8 @@ def _logger_rows(logs: Sequence[Log], channels: set[str]) -> list[Free]:
             step = 0.1 * size
             rows.append(
                 Free(f"sensor.{name}_offset", 0.0, step, -20.0 * step, 20.0 * step,
-                     unit=units[name], register="sensor")
+                     unit="" if name in {"position", "speed"} else CHANNELS[role].unit,
+                     register="sensor")
             )  # fmt: skip
     return rows
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,15 +12,26 @@ from elevon.errors import InputError
 from elevon.logs.log import Log, bridged, per_log
 from elevon.recording import Recording
 
+
 #: What a log may show, by role, and what the logger's delays and offsets are named by.
-NAMES: dict[str, str] = {
-    "output_position": "position",
-    "motor_position": "motor_position",
-    "output_speed": "speed",
-    "motor_speed": "motor_speed",
-    "torque_current": "current",
-    "torque_voltage": "voltage",
+class LoopChannel(NamedTuple):
+    """A channel of a servo's loop: short name, signal, first deviation over spread, linear unit."""
+
+    name: str
+    signal: str
+    first: float
+    unit: str
+
+
+CHANNELS = {
+    "output_position": LoopChannel("position", "output_position", 0.03, "m"),
+    "motor_position": LoopChannel("motor_position", "motor_position", 0.03, "rad"),
+    "output_speed": LoopChannel("speed", "motor_speed", 0.12, "m/s"),
+    "motor_speed": LoopChannel("motor_speed", "motor_speed", 0.12, "rad/s"),
+    "torque_current": LoopChannel("current", "current_q_meas", 0.4, "A"),
+    "torque_voltage": LoopChannel("voltage", "voltage_q_meas", 0.4, "V"),
 }
+NAMES = {role: channel.name for role, channel in CHANNELS.items()}
 _FEWEST = 50  # samples
 _JUMP = 0.02  # of the demand's range within one sample, ...
 _BETWEEN = 3  # points of the demand a sample

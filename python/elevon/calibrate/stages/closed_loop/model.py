@@ -9,22 +9,13 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.calibrate.model_runs import ModelRuns
 from elevon.calibrate.stages.closed_loop.free import STICK
-from elevon.calibrate.stages.closed_loop.log import NAMES, demand, motion, unsigned
+from elevon.calibrate.stages.closed_loop.log import CHANNELS, NAMES, demand, motion, unsigned
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.experiment import Experiment, Inputs, Sensor, Variant
 from elevon.logs.log import Log
 
 #: Role to the model's signal, the sensors' own; and first deviations, as shares of a channel's
 #: spread: what a fair model of an unknown drive leaves.
-_SIGNALS = {
-    "output_position": "output_position", "motor_position": "motor_position",
-    "output_speed": "motor_speed", "motor_speed": "motor_speed",
-    "torque_current": "current_q_meas", "torque_voltage": "voltage_q_meas",
-}  # fmt: skip
-_FIRST = {
-    "output_position": 0.03, "motor_position": 0.03, "output_speed": 0.12, "motor_speed": 0.12,
-    "torque_current": 0.4, "torque_voltage": 0.4,
-}  # fmt: skip
 _FINE = 2  # recorded samples a sample of the log
 
 
@@ -57,11 +48,11 @@ class LoopModel(ModelRuns):
         calm = self.actuator.with_values({"control.speed_gain": 0.0}, source="calibration")
         period = min(log.period for log in logs) / _FINE
         served = {role for log in logs for role in log.channels}
-        shows = {role: signal for role, signal in _SIGNALS.items() if role in served}
+        shows = {role: item.signal for role, item in CHANNELS.items() if role in served}
         experiments = [
             Experiment(log, calm, self._inputs(log), shows, period=period) for log in logs
         ]
-        super().__init__(experiments, _FIRST, check)
+        super().__init__(experiments, {r: item.first for r, item in CHANNELS.items()}, check)
 
     def on(self, logs: Sequence[Log]) -> LoopModel:
         """Return the same servo on other logs."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from elevon.actuator import Actuator
 from elevon.calibrate.stages.closed_loop.fit import Fitted, parts_apart, refitted
 from elevon.calibrate.stages.closed_loop.free import STICK, in_set
-from elevon.calibrate.stages.closed_loop.log import NAMES
+from elevon.calibrate.stages.closed_loop.log import CHANNELS, NAMES
 from elevon.calibrate.stages.closed_loop.model import LoopModel
 from elevon.calibrate.validation import (
     SignalError,
@@ -20,8 +20,6 @@ from elevon.errors import InputError
 from elevon.estimate.free import outer
 from elevon.logs.log import Log
 
-_UNITS = {"position": "m", "speed": "m/s", "motor_position": "rad", "motor_speed": "rad/s",
-          "current": "A", "voltage": "V"}  # fmt: skip
 _ROUNDS = 4
 TRANSIENT = 1.0  # s: what the first state of a drive decides
 
@@ -30,10 +28,9 @@ def units_of(wiring: str) -> dict[str, str]:
     """Return name to SI unit of what a log may show."""
     linear = wiring == "ballscrew"
     return {
-        name: unit if linear else unit.replace("m", "rad", 1)
-        for name, unit in _UNITS.items()
-        if not name.startswith("motor")
-    } | {name: unit for name, unit in _UNITS.items() if name.startswith("motor")}
+        item.name: item.unit if linear else item.unit.replace("m", "rad", 1)
+        for item in CHANNELS.values()
+    }
 
 
 def traces_of(model: LoopModel, values: Mapping[str, float]) -> list[ValidationTrace]:
