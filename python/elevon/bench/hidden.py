@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.data import packaged_toml
 from elevon.parameters.relations import torque_constant
 
-#: What the demonstration expects to find again, and how far a value may be off (relative). Of the
-#: inertias only the sum on the motor shaft acts, so the sum is what is held against the truth.
-RECOVERED: dict[str, float] = {
-    "friction.dynamic": 0.02,
-    "friction.viscous": 0.02,
-    "backlash.total": 0.02,
-    "motor.emf_constant": 0.02,
-    "derived.inertia": 0.02,
-    "control.speed_gain": 0.02,
-    "control.integral_time": 0.02,
-}
+_TABLES = packaged_toml("elevon.bench", "hidden.toml")
+RECOVERED: Mapping[str, float] = _TABLES["recovered"]
+"""Paths that the demonstration expects to find again, each with its relative tolerance."""
 
 
 def hidden_actuator(base: Actuator, seed: int) -> Actuator:
     """Draw the actuator on the bench.
 
-    The spreads are ASSUMED: what a printed gearbox, another batch of magnets and a tuned drive may
-    differ by. The drive is a PWM drive, as the real one is, and knows its motor's torque constant.
+    The drive is a PWM drive, as the real one is, and knows its motor's torque constant.
 
     Parameters
     ----------
@@ -37,16 +30,8 @@ def hidden_actuator(base: Actuator, seed: int) -> Actuator:
     """
     rng = np.random.default_rng([seed, 7])
     value = base.parameters.value
-    friction = rng.uniform(0.75, 1.35)
-    scale = {
-        "friction.dynamic": friction,
-        "friction.static": friction,
-        "friction.viscous": rng.uniform(0.7, 1.3),
-        "motor.emf_constant": rng.uniform(0.94, 1.06),
-        "motor.inertia": rng.uniform(0.85, 1.2),
-        "control.speed_gain": rng.uniform(0.85, 1.2),
-        "control.integral_time": rng.uniform(0.8, 1.25),
-    }
+    scale = {path: rng.uniform(*ends) for path, ends in _TABLES["spread"].items()}
+    scale["friction.static"] = scale["friction.dynamic"]
     values: dict[str, str | float] = {path: value(path) * float(f) for path, f in scale.items()}
     emf = float(values["motor.emf_constant"])
     values |= {

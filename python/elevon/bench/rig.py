@@ -10,20 +10,10 @@ from typing import Any
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.bench import steps
 from elevon.bench.brake_rig import BrakeRig, BrakeRun, CellState, brake_loop
 from elevon.bench.load_module import Springs, Weights, springs_of, weights_of
 from elevon.bench.procedure import Procedure
-from elevon.bench.steps import (
-    BacklashStep,
-    BrakeStep,
-    ForceStep,
-    RigStep,
-    SensorStep,
-    SettingsStep,
-    SpringStep,
-    TraceStep,
-    WeightsStep,
-)
 from elevon.errors import InputError
 from elevon.faults import Fault
 from elevon.scenario import Scenario
@@ -85,7 +75,7 @@ class BenchSetup:
         What chance set.
     """
 
-    trace: TraceStep
+    trace: steps.TraceStep
     actuator: Actuator
     scenario: Scenario
     conditions: Conditions
@@ -165,10 +155,10 @@ def setups(
     rig = Rig()
     setups: list[Setup] = []
     for step in procedure.step:
-        if isinstance(step, TraceStep):
+        if isinstance(step, steps.TraceStep):
             conditions = draw_conditions(seed, len(setups))
             setups.append(_setup(step, rig, actuator, conditions, faults))
-        elif isinstance(step, ForceStep | RigStep | SensorStep):
+        elif isinstance(step, steps.ForceStep | steps.RigStep | steps.SensorStep):
             raise InputError(f"{procedure.name}: the rotary bench has no {step.kind!r}")
         else:
             rig = _changed(rig, step)
@@ -184,21 +174,26 @@ def _check(actuator: Actuator) -> None:
 
 
 def _changed(
-    rig: Rig, step: BacklashStep | BrakeStep | SpringStep | WeightsStep | SettingsStep
+    rig: Rig,
+    step: steps.BacklashStep
+    | steps.BrakeStep
+    | steps.SpringStep
+    | steps.WeightsStep
+    | steps.SettingsStep,
 ) -> Rig:
-    if isinstance(step, BacklashStep):
+    if isinstance(step, steps.BacklashStep):
         return replace(rig, backlash=step.value())
-    if isinstance(step, BrakeStep):
+    if isinstance(step, steps.BrakeStep):
         return replace(rig, brake=step.terms)
-    if isinstance(step, SpringStep):
+    if isinstance(step, steps.SpringStep):
         return replace(rig, springs=springs_of(step))
-    if isinstance(step, WeightsStep):
+    if isinstance(step, steps.WeightsStep):
         return replace(rig, weights=weights_of(step))
     return replace(rig, settings={**rig.settings, **step.parameters})
 
 
 def _setup(
-    step: TraceStep,
+    step: steps.TraceStep,
     rig: Rig,
     actuator: Actuator,
     conditions: Conditions,
@@ -259,7 +254,7 @@ def _loads(
     return {"brake": {"terms": resist}, "output": {"terms": output}}
 
 
-def moved_command(step: TraceStep, start: float) -> dict[str, Any]:
+def moved_command(step: steps.TraceStep, start: float) -> dict[str, Any]:
     """Return a step's command, its waveforms and actions later by `start` [s]."""
     data: dict[str, Any] = step.command.model_dump(exclude_unset=True, mode="json")
     if "terms" in data:

@@ -15,7 +15,7 @@ from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_lo
 from elevon.bench.procedure import Procedure, procedure_names
 from elevon.bench.rig import Setup, setups
 from elevon.bench.stand import stand_of
-from elevon.bench.state import BenchState
+from elevon.bench.state import claim_logs, told
 from elevon.bench.traces import recorded, write_traces
 from elevon.errors import InputError, Interrupted
 from elevon.faults import Fault
@@ -25,7 +25,7 @@ from elevon.plain import WORKING, Plain, in_unit
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.results import Result
-from elevon.worklog import locked, sweep
+from elevon.worklog import WorkLog, locked, sweep
 
 
 @dataclass(frozen=True)
@@ -204,12 +204,12 @@ def run_procedure(
     logs, simulated = [], 0.0
     with locked(folder):
         sweep(folder)
-        state = _claim(procedure, folder, logs_asked, fidelity, layout, force=force)
+        state, resumed = _claim(procedure, folder, logs_asked, fidelity, layout, force=force)
         for number, setup in enumerate(logs_asked):
             share = part(progress, number / len(logs_asked), (number + 1) / len(logs_asked))
             if share is not None and share(0.0) is False:
                 raise Interrupted(f"stopped before the log {setup.trace.name}")
-            log, seconds = _one(setup, state, layout, fidelity, share, force=force)
+            log, seconds = _one(setup, state, layout, fidelity, share, force=force or resumed)
             logs.append(log)
             simulated += seconds
     written = None if truth is None else write_text(truth, text, force=force or same)
@@ -232,10 +232,10 @@ def _claim(
     layout: DriveFormat,
     *,
     force: bool,
-) -> BenchState:
+) -> tuple[WorkLog, bool]:
     names = [setup.trace.name for setup in logs]
     key = _key(logs, fidelity, layout)
-    return BenchState.claim(state_file(folder, procedure.name), key, names, force=force)
+    return claim_logs(state_file(folder, procedure.name), key, names, force=force)
 
 
 def _key(logs: Sequence[AnySetup], fidelity: str, layout: DriveFormat) -> str:
@@ -249,7 +249,7 @@ def _key(logs: Sequence[AnySetup], fidelity: str, layout: DriveFormat) -> str:
 
 def _one(
     setup: AnySetup,
-    state: BenchState,
+    state: WorkLog,
     layout: DriveFormat,
     fidelity: str,
     progress: Progress | None,
@@ -257,22 +257,22 @@ def _one(
     force: bool,
 ) -> tuple[BenchLogFiles, float]:
     name, folder = setup.trace.name, state.path.parent
-    stored = state.intact(name)
-    if stored is not None:
-        files = tuple(folder / file for file in stored.files)
-        return BenchLogFiles(name, stored.status, files, True, stored.message), 0.0
-    again = force or state.resumed
+    item = state.intact(name)
+    known = None if item is None else told(item)
+    if item is not None and known is not None:
+        files = tuple(folder / file for file in item.files)
+        return BenchLogFiles(name, known[0], files, True, known[1]), 0.0
     if isinstance(setup, LoadedSetup):
         log, recording = run_loaded(setup, fidelity, progress)
-        written = write_loaded(folder, name, log, force=again)
+        written = write_loaded(folder, name, log, force=force)
     else:
         recording = _drive_run(setup, fidelity, progress)
-        written = write_traces(folder, setup, recording, layout, force=again)
+        written = write_traces(folder, setup, recording, layout, force=force)
     status, message = str(recording.meta["status"]), str(recording.meta["message"])
     if isinstance(setup, LoadedSetup):
         message = "; ".join(filter(None, (message, setup.message)))
     files = tuple(written)
-    state.note(name, status, message, files)
+    state.note(name, files, status=status, message=message)
     return BenchLogFiles(name, status, files, False, message), float(recording.meta["sim_s"])
 
 
@@ -280,15 +280,11 @@ def _drive_run(setup: Setup, fidelity: str, progress: Progress | None) -> Record
     from elevon.scenario.compile import signal_records
     from elevon.simulate import simulate
 
-    known = list(signal_records(setup.actuator.wiring, fidelity))
+    record = recorded(list(signal_records(setup.actuator.wiring, fidelity)))
     return simulate(
-        setup.actuator,
-        setup.scenario,
-        fidelity=fidelity,
-        record=recorded(known),
-        seed=setup.conditions.seed,
-        progress=progress,
-    )
+        setup.actuator, setup.scenario, fidelity=fidelity, record=record,
+        seed=setup.conditions.seed, progress=progress,
+    )  # fmt: skip
 
 
 def _hidden(

@@ -68,11 +68,11 @@ class CommandFit(Plain):
     waveform: Annotated[WaveformFit, REMAINDER]
     gain: Annotated[float, key("position_gain")]
     gain_std: Annotated[float, key("position_gain_std")]
-    amplitude: Annotated[float, WORKING]
-    amplitude_std: Annotated[float, WORKING]
-    factor: Annotated[float | None, key("amplitude_factor")]
     reach: Annotated[float, WORKING]
     values: Annotated[Floats, WORKING] = field(repr=False, compare=False)
+    amplitude: Annotated[float, WORKING] = math.nan
+    amplitude_std: Annotated[float, WORKING] = math.nan
+    factor: Annotated[float | None, key("amplitude_factor")] = None
 
     COMPUTED: ClassVar = ("amplitude_factor_std",)
 
@@ -149,9 +149,6 @@ def _noted_with_gain(log: Log, noted: NotedCommand, gain: float, limit: float) -
         waveform=waveform,
         gain=gain / float(inverse),
         gain_std=gain * float(std[0]) / float(inverse) ** 2,
-        amplitude=math.nan,
-        amplitude_std=math.nan,
-        factor=None,
         reach=math.sqrt(2.0) * float(np.std(ref)),
         values=noted_values(log.note, "rad", log.time - start),
     )

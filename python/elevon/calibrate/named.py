@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from elevon.actuator import Actuator
+from elevon.data import packaged_toml
 from elevon.estimate import Estimate
-from elevon.parameters.records import record_of, records
+from elevon.parameters.records import records
 
 
 def named(
     number: Estimate,
     path: str,
     actuator: Actuator,
-    note: str = "",
+    note: str | None = None,
     *,
     given: tuple[str, ...] = (),
     source: str = "signals",
@@ -33,17 +34,20 @@ def named(
     actuator : Actuator
         Values before.
     note, given, source, unit, register
-        As in `Estimate`.
+        As in `Estimate`; of what no actuator file holds by default those of ``derived.toml``.
     in_set : bool, optional
         Whether the actuator file takes it; default: where it has a place for it.
     """
-    has_place = path in records(actuator.wiring)
-    old = actuator.parameters.value(path) if has_place else None
-    if has_place:
-        record = record_of(actuator.wiring, path)
-        unit, register = record.unit, record.register
+    record = records(actuator.wiring).get(path)
+    has_place, old = record is not None, None
+    if record is not None:
+        unit, register, old = record.unit, record.register, actuator.parameters.value(path)
         number = number.within(low=record.minimum)
+    elif not unit:
+        about = packaged_toml("elevon.calibrate", "derived.toml")[path.partition("[")[0]]
+        unit, register = about["unit"], about.get("register", register)
+        note = about["note"] if note is None else note
     return replace(
         number, path=path, unit=unit, register=register, old=old, source=source, given=given,
-        note=note, in_set=has_place if in_set is None else in_set,
+        note=note or "", in_set=has_place if in_set is None else in_set,
     )  # fmt: skip

@@ -75,18 +75,13 @@ class _Sheet:
         self,
         path: str,
         function: Callable[[Floats], float],
-        note: str = "",
+        note: str | None = None,
         *,
-        unit: str = "",
-        register: str = "plant",
         scaled: bool = False,
     ) -> float:
         """Add a function of the coefficients (`scaled`: a torque) and return its value."""
         given = _GIVEN if scaled and not self.torque.measured else ()
-        item = named(
-            self.plant.of(function), path, self.actuator, note, given=given, unit=unit,
-            register=register,
-        )  # fmt: skip
+        item = named(self.plant.of(function), path, self.actuator, note, given=given)
         self.estimates.append(item)
         return item.value
 
@@ -106,11 +101,9 @@ def plant_estimates(
     if torque.measured:
         note = "from the load cell: torque constant over 1.5"
         sheet.add("motor.emf_constant", lambda b: emf_constant(scale(b), share), note)
-        sheet.add("derived.torque_constant", scale, "per peak ampere", unit="N m/A")
-    note = "all inertia on the motor shaft"
-    total = sheet.add("derived.inertia", lambda b: scale(b) * b[0], note, unit="kg m2", scaled=True)
-    note = "inertia over torque constant: what the current alone tells"
-    sheet.add("derived.inertia_per_torque", lambda b: float(b[0]), note, unit="A s2/rad")
+        sheet.add("derived.torque_constant", scale)
+    total = sheet.add("derived.inertia", lambda b: scale(b) * b[0], scaled=True)
+    sheet.add("derived.inertia_per_torque", lambda b: float(b[0]))
     follow = _inertia(sheet, total)
     sheet.add("friction.dynamic", lambda b: scale(b) * b[2], scaled=True)
     sheet.add("friction.viscous", lambda b: scale(b) * b[1], scaled=True)
@@ -138,26 +131,14 @@ def _sensors(sheet: _Sheet) -> None:
     names, scale = sheet.plant.names, sheet.scale
     if "offset" in names:
         offset = names.index("offset")
-        note = "or a constant load: the current alone cannot tell them apart"
-        sheet.add(
-            "sensor.current_offset", lambda b: float(b[offset]), note, unit="A", register="sensor"
-        )
+        sheet.add("sensor.current_offset", lambda b: float(b[offset]))
     if "cell" in names:
         cell = names.index("cell")
-        sheet.add(
-            "sensor.load_cell_offset", lambda b: scale(b) * float(b[cell]),
-            "of the brake torque the load cell shows, the mean over its log",
-            unit="N m", register="sensor", scaled=True,
-        )  # fmt: skip
+        sheet.add("sensor.load_cell_offset", lambda b: scale(b) * float(b[cell]), scaled=True)
     if "constant" in names:
-        note = "of the torque behind the current's set point: no measured current is in the logs"
-        sheet.add(
-            "derived.current_loop_lag", lambda b: -float(b[-1]), note, unit="s",
-            register="controller",
-        )  # fmt: skip
+        sheet.add("derived.current_loop_lag", lambda b: -float(b[-1]))
         return
-    note = "of the logged current behind the motion"
-    sheet.add("sensor.current_lag", lambda b: float(b[-1]), note, unit="s", register="sensor")
+    sheet.add("sensor.current_lag", lambda b: float(b[-1]))
     if sheet.plant["lag"] > _SEEN * sheet.plant.std("lag"):
         note = "first-order filter of this lag"
         sheet.add("sensor.filter_cutoff", lambda b: 1.0 / (2.0 * np.pi * b[-1]), note)
@@ -203,11 +184,8 @@ def controller_estimates(
     return [
         named(gain, "control.speed_gain", actuator, given=given),
         *_times(actuator, law, ", ".join(logs)),
-        named(
-            integral, "derived.integral_gain", actuator, "speed gain over integral time",
-            given=given, unit="N m/rad", register="controller",
-        ),
-    ]  # fmt: skip
+        named(integral, "derived.integral_gain", actuator, given=given),
+    ]
 
 
 def _half_tick(actuator: Actuator) -> float:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.calibrate.thresholds import thresholds
+from elevon.data import packaged_toml
 from elevon.estimate import LEVEL
 from elevon.files import write_text
 from elevon.parameters import Parameter
@@ -58,12 +60,7 @@ def _unit(wiring: str, path: str) -> str:
 
 
 def _followed(path: str) -> str:
-    reasons = {
-        "friction.static": "not determined: its ratio to friction.dynamic is kept",
-        "control.torque_constant": "the controller is taken to know the motor, as before",
-        "drive.kind": "the kind of drive whose model explains the logs better",
-        "control.structure": "the structure that predicts held-out data better",
-    }
+    reasons: Mapping[str, str] = packaged_toml("elevon.calibrate", "followed.toml")
     return reasons.get(path, "scaled with motor.inertia: only the sum is determined")
 
 

@@ -60,7 +60,11 @@ def _backlash_estimates(
     if backlash is None:
         return [], ()
     estimates = _backlash(backlash, count, actuator)
-    estimates += [_initial(log, backlash, count, actuator) for log in logs if _both_positions(log)]
+    estimates += [
+        _initial(log, backlash, count, actuator)
+        for log in logs
+        if log.has("motor_position", "output_position")
+    ]
     fitted = backlashes
     if each and not backlashes:
         fits = {log.name: fit_backlash([log], ratio, count) for log in logs}
@@ -87,15 +91,10 @@ def _own_backlash(name: str, backlash: BacklashFit, count: float, actuator: Actu
 
 def _speed_estimates(logs: Sequence[Log], actuator: Actuator) -> list[Estimate]:
     """Gain and offset of the speed sensor."""
-    units = {"gain": "1", "offset": "rad/s"}
-    note = "of the logged speed against the motor's angle"
     return [
-        named(
-            Estimate(*pair), f"sensor.speed_{name}", actuator, note, unit=units[name],
-            register="sensor",
-        )
+        named(Estimate(*pair), f"sensor.speed_{name}", actuator)
         for name, pair in (speed_sensor(logs) or {}).items()
-    ]  # fmt: skip
+    ]
 
 
 def _limit_estimates(logs: Sequence[Log], actuator: Actuator) -> list[Estimate]:
@@ -146,30 +145,20 @@ def _counted(value: float, backlash: BacklashFit, count: float) -> Estimate:
     return Estimate(value, std, interval=(value - half, value + half))
 
 
-def _both_positions(log: Log) -> bool:
-    return log.has("motor_position") and log.has("output_position")
-
-
 def _initial(log: Log, backlash: BacklashFit, count: float, actuator: Actuator) -> Estimate:
     """Where in the backlash the motor stood when a log began."""
     ratio = actuator.parameters.value("gear.ratio")
     seen = backlash.gain[0] * log.motor[0] / ratio + backlash.offset[0] - log.output[0]
-    note = "motor over ratio less output at the first sample; 0: the middle of the backlash"
     number = _counted(float(seen), backlash, count)
-    path = f"initial.lead[{log.name}]"
-    return named(number, path, actuator, note, unit="rad", register="initial")
+    return named(number, f"initial.lead[{log.name}]", actuator)
 
 
 def _encoder(backlash: BacklashFit, actuator: Actuator, rounded: float) -> list[Estimate]:
     """Delay and gain of the encoder against the motor's sensor."""
     # All counts between the turns determine the gain, only those at the turns are rounded alike.
     gain, std = backlash.gain[0], math.hypot(backlash.gain[1], _TURNS * rounded / backlash.reach)
-    note = "of the encoder behind the motor's sensor"
     return [
-        named(
-            Estimate(*backlash.delay, backlash.degrees), "sensor.encoder_delay", actuator, note,
-            unit="s", register="sensor",
-        ),
+        named(Estimate(*backlash.delay, backlash.degrees), "sensor.encoder_delay", actuator),
         named(
             Estimate(gain, std, backlash.degrees), "sensor.encoder.gain", actuator,
             "encoder over motor and ratio", in_set=abs(gain - 1.0) > max(3.0 * std, 1e-4),

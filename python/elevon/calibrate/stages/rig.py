@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from elevon.calibrate.stages.context import Context
-from elevon.calibrate.stages.rig_tables import (
-    friction_knots,
-    hanging_mass,
-    harmonic_knots,
-)
+from elevon.calibrate.stages.rig_tables import friction_knots, hanging_mass, harmonic_knots
 from elevon.calibrate.stages.rig_tests import RigTest, rig_tests
 from elevon.estimate import Estimate
 
