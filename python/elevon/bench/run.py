@@ -15,7 +15,7 @@ from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_lo
 from elevon.bench.procedure import Procedure, procedure_names
 from elevon.bench.rig import Setup, setups
 from elevon.bench.stand import stand_of
-from elevon.bench.state import claim_logs, told
+from elevon.bench.state import claim_logs, ending_of
 from elevon.bench.traces import recorded, write_traces
 from elevon.errors import InputError, Interrupted
 from elevon.faults import Fault
@@ -258,7 +258,7 @@ def _one(
 ) -> tuple[BenchLogFiles, float]:
     name, folder = setup.trace.name, state.path.parent
     item = state.intact(name)
-    known = None if item is None else told(item)
+    known = None if item is None else ending_of(item)
     if item is not None and known is not None:
         files = tuple(folder / file for file in item.files)
         return BenchLogFiles(name, known[0], files, True, known[1]), 0.0

@@ -55,10 +55,10 @@ def finished_logs(path: Path) -> list[str]:
         log = WorkLog.read(path)
     except FormatError:
         return []
-    return [] if log is None else [name for name, item in log.items.items() if told(item)]
+    return [] if log is None else [name for name, item in log.items.items() if ending_of(item)]
 
 
-def told(item: Item) -> tuple[str, str] | None:
+def ending_of(item: Item) -> tuple[str, str] | None:
     """Return status (``ok`` or ``tripped``) and message of a finished log; None: it says none."""
     status, message = item.data.get("status"), item.data.get("message")
     if item.files and isinstance(status, str) and isinstance(message, str):
