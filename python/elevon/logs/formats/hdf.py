@@ -23,15 +23,17 @@ def numeric_vectors(path: Path, limits: Limits) -> Vectors:
     FormatError
         A damaged file, or one beyond the limits.
     """
-    found = Vectors(str(path), limits)
+    vectors = Vectors(str(path), limits)
     with opened(path) as file:
         for name, data in datasets(file):
-            values = data if isinstance(data, str) else _array(path, name, data, limits, found.size)
+            values = (
+                data if isinstance(data, str) else _array(path, name, data, limits, vectors.size)
+            )
             if isinstance(values, str):
-                found.pass_over(name, values)
+                vectors.pass_over(name, values)
             else:
-                found.add(name, values.astype(np.float64), text_attribute(data, "units"))
-    return found
+                vectors.add(name, values.astype(np.float64), text_attribute(data, "units"))
+    return vectors
 
 
 def _array(

@@ -30,15 +30,15 @@ def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTabl
     file = existing_file(path, limits)
     if is_hdf5(file):
         return numeric_vectors(file, limits).table("mat 7.3")
-    found = Vectors(str(file), limits)
+    vectors = Vectors(str(file), limits)
     for variable in _bounded(file, limits):
         for label, item in _members(file, variable):
             numbers = _numbers(item)
             if isinstance(numbers, str):
-                found.pass_over(label, numbers)
+                vectors.pass_over(label, numbers)
             else:
-                found.add(label, numbers)
-    return found.table("mat 5")
+                vectors.add(label, numbers)
+    return vectors.table("mat 5")
 
 
 def has_variable(path: Path, name: str, limits: Limits) -> bool:

@@ -35,19 +35,19 @@ def read_netcdf(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTabl
 def _classic(file: Path, limits: Limits) -> RawTable:
     from scipy.io import netcdf_file
 
-    found = Vectors(str(file), limits)
+    vectors = Vectors(str(file), limits)
     try:
         with netcdf_file(str(file), "r", mmap=False) as content:
             for name, variable in content.variables.items():
                 data = np.asarray(variable.data)
                 if data.dtype.kind not in "fiub" or sum(n > 1 for n in data.shape) > 1:
-                    found.pass_over(name, "not a vector of numbers")
+                    vectors.pass_over(name, "not a vector of numbers")
                     continue
                 unit = getattr(variable, "units", b"")
                 text = unit.decode("utf-8", "replace")[:40] if isinstance(unit, bytes) else ""
-                found.add(name, data.astype(np.float64).reshape(-1), text)
+                vectors.add(name, data.astype(np.float64).reshape(-1), text)
     except FormatError:
         raise
     except Exception as error:
         raise FormatError(f"{file}: damaged NetCDF file: {quoted(str(error))}") from error
-    return found.table("netcdf 3")
+    return vectors.table("netcdf 3")

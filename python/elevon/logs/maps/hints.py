@@ -56,8 +56,8 @@ def _without_unit(header: str) -> str:
 
 
 def _by_words(text: str) -> str:
-    found = {name for name, words in _HINTS["words"].items() if re.search(words, text)}
-    return next((role for role, *words in _HINTS["rules"]["all"] if found.issuperset(words)), "")
+    groups = {name for name, words in _HINTS["words"].items() if re.search(words, text)}
+    return next((role for role, *words in _HINTS["rules"]["all"] if groups.issuperset(words)), "")
 
 
 def unit_hint(header: str, stated: str) -> str:
