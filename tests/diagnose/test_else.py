@@ -124,7 +124,9 @@ def test_a_fault_may_move_a_number_that_the_model_leaves_alone_by_a_share_of_its
 
 def test_one_feature_alone_is_a_direction_of_the_test():
     """A number that no candidate moves is seen by itself, at the rate that is set."""
-    case = _case([1, 1, 1, 1, 1.2], [[1.0] * 5])
+    base = [[1.0] * 5]
+    std = float(np.sqrt(_case(base[0], base).covariance[4, 4]))
+    case = _case([1, 1, 1, 1, 1 + 4.25 * std], base)
     residual, root, detector = detector_of([case], [BACKLASH])
     assert detector.score((root @ residual)[None, :])[0] > detector.threshold(0.05)
 

@@ -17,7 +17,6 @@ import numpy as np
 from elevon.diagnose.engine.posterior import Posterior
 
 if TYPE_CHECKING:
-    from elevon.arrays import Floats
     from elevon.diagnose.engine.candidates import CandidateFault
     from elevon.diagnose.engine.case import LogCase
 
@@ -114,7 +113,7 @@ def _ratio(case: LogCase, c: CandidateFault, name: str, severity: float) -> floa
     degrees = case.plausible.degrees
     if name in c.amplified:  # the candidate scales it, the other moves it anyhow
         off = score - severity * float(case.plausible.mean[k]) / std
-        density: Floats = student.pdf(off, degrees, scale=np.hypot(1.0, _WIDE))
+        density = student.pdf(off, degrees, scale=np.hypot(1.0, _WIDE))
         return float(np.mean(density) / student.pdf(off, degrees))
     moved = case.item.lookalike_moves(c.key, severity).get(name) if case.item is not None else None
     if moved is None:
