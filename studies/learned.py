@@ -22,7 +22,8 @@ from elevon.diagnose.modelfree.scores import share_interval
 from elevon.errors import ElevonWarning, InputError
 from elevon.progress import Progress
 from elevon.report import Check, verdict
-from studies.independent.bench import CAUSES, TESTS, Cause, Unit, singles, together, units, written
+from studies.independent.bench import CAUSES, TESTS, Cause, Unit, singles, together, written
+from studies.independent.bench import units as units_of
 from studies.side_by_side import side_by_side
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ def study_learned(
     """
     if units < 8:
         raise InputError(f"--units {units}: at least eight")
-    drawn = _units(seed, units)
+    drawn = units_of(seed, units)
     calls = {str(u.number): partial(_logs, u, seed) for u in drawn}
     logs = dict(side_by_side(calls, processes=processes, progress=progress))
     count = 3 * units // 4
@@ -127,10 +128,6 @@ def study_learned(
     others = [item for u in drawn[count:] for item in logs[str(u.number)]]
     refused = every - sum(map(len, logs.values()))
     return LearnedResult(dict(learned.report), tuple(_seen(learned, others)), refused, seed)
-
-
-def _units(seed: int, count: int) -> list[Unit]:
-    return units(seed, count)
 
 
 def _logs(unit: Unit, seed: int) -> Labelled:

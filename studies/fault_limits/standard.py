@@ -81,19 +81,13 @@ def _rotary(
     progress: Progress | None,
 ) -> list[Log]:
     from elevon.bench.rig import setups
-    from elevon.bench.traces import recorded
-    from elevon.bench.virtual import traced
-    from elevon.scenario.compile import signal_records
-    from elevon.simulate import Run, simulate_batch
+    from elevon.reproduce.torino_bench.unit import logs_of
 
     ready = [
         setups(test.procedure, _of_day(actuator, day), faults=day.faults, seed=day.seed)[0]
         for day in days
     ]
-    record = recorded(list(signal_records(actuator.wiring, fidelity)))
-    runs = [Run(s.actuator, s.scenario, s.conditions.seed) for s in ready]
-    recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
-    return [traced(s, recording) for s, recording in zip(ready, recordings, strict=True)]
+    return logs_of(ready, fidelity, progress, whole=False)
 
 
 def _loaded(

@@ -218,10 +218,8 @@ Job = tuple[str, "Setup", "Log", "Log"]
 def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[Job]:
     from elevon.bench.procedure import load_procedure
     from elevon.bench.rig import setups
-    from elevon.bench.traces import recorded
-    from elevon.bench.virtual import first_trace, traced
-    from elevon.scenario.compile import signal_records
-    from elevon.simulate import Run, simulate_batch
+    from elevon.bench.virtual import first_trace
+    from elevon.reproduce.torino_bench.unit import logs_of
 
     procedure = first_trace(load_procedure(_PROCEDURE))
     pairs: list[tuple[str, Setup]] = []
@@ -230,10 +228,7 @@ def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[J
             texts = [_text(key, s, k) for key, s in CASES[case].items()] if case else []
             run_seed = 1000 * seed + 100 * k + number
             pairs.append((case, setups(procedure, unit, faults=texts, seed=run_seed)[0]))
-    record = recorded(list(signal_records(unit.wiring, "high")))
-    runs = [Run(s.actuator, s.scenario, s.conditions.seed) for _, s in pairs]
-    recordings = simulate_batch(runs, record=record)
-    logs = [traced(s, r) for (_, s), r in zip(pairs, recordings, strict=True)]
+    logs = logs_of([setup for _, setup in pairs], "high", None, whole=False)
     width = 1 + len(cases)
     return [
         (case, setup, logs[n], logs[n - n % width]) for n, (case, setup) in enumerate(pairs) if case

@@ -146,8 +146,10 @@ def study(
         gain = _interval(np.subtract(errors["kriging"], errors["cokriging"]))
     variants = [SurrogateScore(name, *runs[name], them, *_interval(np.array(them)))
                 for name, them in errors.items()]  # fmt: skip
-    known = (None, None) if pairs is None else (cost_ratio, pairs.correlation)
-    return Study(response, unit, count, withheld, splits, budget, *known, variants, *gain)
+    ratio = None if pairs is None else cost_ratio
+    correlation = None if pairs is None else pairs.correlation
+    return Study(response, unit, count, withheld, splits, budget, ratio, correlation,
+                 variants, *gain)  # fmt: skip
 
 
 def _check_budget(high: Samples, withheld: int, budget: int) -> None:

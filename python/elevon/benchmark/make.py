@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 
 from elevon.errors import InputError, unknown
 from elevon.files import read_regular, write_text
+from elevon.progress import Progress, part
 from elevon.worklog import locked
 
 #: Raised whenever the same seed and size give other data on purpose.
@@ -61,7 +62,7 @@ def make_benchmark(
     runs: int | None = None,
     seed: int = 0,
     threads: int | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Progress | None = None,
 ) -> Made:
     """Make the benchmark set, or go on with one that was interrupted.
 
@@ -109,7 +110,7 @@ def make_benchmark(
             text,
             folder / name,
             threads=threads,
-            progress=_share(progress, place, len(plans)),
+            progress=part(progress, place / len(plans), (place + 1) / len(plans)),
         )
         failed += len(result.failed)
         campaigns.append(_campaign(name, result.manifest))
@@ -214,14 +215,6 @@ def _campaign(name: str, manifest: Any) -> dict[str, Any]:
         "plan_hash": manifest.plan_hash,
         "data_hash": hashlib.sha256(json.dumps(hashes).encode()).hexdigest(),
     }
-
-
-def _share(
-    progress: Callable[[float], Any] | None, place: int, count: int
-) -> Callable[[float], Any] | None:
-    if progress is None:
-        return None
-    return lambda fraction: progress((place + fraction) / count)
 
 
 def _card(about: Mapping[str, Any]) -> str:

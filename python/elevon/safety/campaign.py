@@ -12,7 +12,7 @@ from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
 from elevon.faults.catalogue import find_record
 from elevon.plain import WORKING, Plain, fields_of, key
-from elevon.progress import Progress
+from elevon.progress import Progress, part
 from elevon.report.checks import Check, CheckedResult
 from elevon.safety.hazards import HAZARDS, RECORD, observe
 from elevon.safety.reasons import reason
@@ -159,9 +159,9 @@ def safety(
         *itertools.islice(population(WIRING, "low", seed), 0, None, every),
         *triples(WIRING, "low", seed, max(1, TRIPLES // every)),
     ]
-    first = list(judged(actuator, rows, "low", _share(progress, 0.0, 0.8)))
+    first = list(judged(actuator, rows, "low", part(progress, 0.0, 0.8)))
     repeated = list({id(row): row for _, row, _ in first}.values())
-    again = list(judged(actuator, repeated, "high", _share(progress, 0.8, 1.0)))
+    again = list(judged(actuator, repeated, "high", part(progress, 0.8, 1.0)))
     # What shows at both fidelities is told as high judged it, what shows at one alone counts too.
     seen = {(hazard, id(row)): (row, "low", time) for hazard, row, time in first}
     seen |= {(hazard, id(row)): (row, "high", time) for hazard, row, time in again}
@@ -216,7 +216,7 @@ def judged(
         ]
         recordings = simulate_batch(
             runs, fidelity=fidelity, record=RECORD,
-            progress=_share(progress, begin / len(rows), (begin + len(chunk)) / len(rows)),
+            progress=part(progress, begin / len(rows), (begin + len(chunk)) / len(rows)),
         )  # fmt: skip
         for recording, row in zip(recordings, chunk, strict=True):
             if recording.status not in {"ok", "tripped"}:
@@ -237,15 +237,6 @@ def per_hour(row: Row) -> float:
     """
     rates = [find_record(fault.kind, fault.place, WIRING).rate for fault in row.faults]
     return math.prod(rates)
-
-
-def _share(
-    progress: Callable[[float], bool] | None, begin: float, end: float
-) -> Callable[[float], bool] | None:
-    """Return a progress that goes from one fraction to another."""
-    if progress is None:
-        return None
-    return lambda fraction: progress(begin + fraction * (end - begin))
 
 
 def _checks(hazards: Iterable[HazardResult], rows: Sequence[Row]) -> list[Check]:

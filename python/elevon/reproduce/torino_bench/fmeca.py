@@ -17,7 +17,7 @@ from elevon.logs.log import Log
 from elevon.plain import Plain
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, CheckedResult
-from elevon.reproduce.torino_bench.unit import ACTUATOR
+from elevon.reproduce.torino_bench.unit import ACTUATOR, logs_of
 
 LEAST_CHANGE = 1.0
 """Percent of a channel's RMS by which a fault must change it. ASSUMED."""
@@ -99,20 +99,12 @@ def reproduce_fmeca(*, seed: int = 0, progress: Progress | None = None) -> Fmeca
     progress : callable, optional
         As for `simulate_batch`.
     """
-    from elevon.bench.traces import recorded
-    from elevon.bench.virtual import traced
     from elevon.diagnose.door import diagnose
-    from elevon.scenario.compile import signal_records
-    from elevon.simulate import Run, simulate_batch
 
     unit = Actuator.load(ACTUATOR).with_values(LINK, source="of a drive of this size")
     ready = [_setup(unit, "", seed + 1), _setup(unit, "", seed)]
     ready += [_setup(unit, fault, seed) for _, _, fault in LINES]
-    record = recorded(list(signal_records(unit.wiring, "high")))
-    runs = [Run(s.actuator, s.scenario, s.conditions.seed, s.trace.name) for s in ready]
-    recordings = simulate_batch(runs, fidelity="high", record=record,
-                                progress=part(progress, 0.0, 0.7))  # fmt: skip
-    logs = [traced(setup, run) for setup, run in zip(ready, recordings, strict=True)]
+    logs = logs_of(ready, "high", part(progress, 0.0, 0.7), whole=False)
     baseline, good, *faulty = logs
     healthy = diagnose(good, unit, baseline).status
     rows = []

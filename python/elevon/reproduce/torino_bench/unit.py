@@ -7,6 +7,7 @@ from typing import Any
 
 from elevon.actuator import Actuator
 from elevon.bench.procedure import Procedure
+from elevon.bench.rig import Setup, setups
 from elevon.documents import Document, validated
 from elevon.logs.log import Log
 from elevon.progress import Progress, part
@@ -82,14 +83,35 @@ def bench_logs(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.bench.rig import setups
+    return logs_of(setups(procedure, unit, seed=seed), fidelity, progress)
+
+
+def logs_of(
+    ready: Sequence[Setup], fidelity: str, progress: Progress | None, *, whole: bool = True
+) -> list[Log]:
+    """Return what the bench records of traces that are set up.
+
+    Parameters
+    ----------
+    ready : sequence of Setup
+        The traces.
+    fidelity, progress
+        As for `simulate_batch`.
+    whole : bool
+        Whether each must reach its end.
+
+    Raises
+    ------
+    SimulationError
+        `whole`, and a run did not reach its end.
+    """
     from elevon.bench.traces import recorded
     from elevon.bench.virtual import traced
     from elevon.scenario.compile import signal_records
     from elevon.simulate import Run, completed, simulate_batch
 
-    ready = setups(procedure, unit, seed=seed)
     runs = [Run(s.actuator, s.scenario, s.conditions.seed, s.trace.name) for s in ready]
-    record = recorded(list(signal_records(unit.wiring, fidelity)))
+    record = recorded(list(signal_records(ready[0].actuator.wiring, fidelity)))
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
-    return [traced(setup, run) for setup, run in zip(ready, completed(recordings), strict=True)]
+    ended = completed(recordings) if whole else recordings
+    return [traced(setup, run) for setup, run in zip(ready, ended, strict=True)]
