@@ -155,7 +155,7 @@ def same_rate(logs: list[ImportedLog]) -> None:
 def _saved(path: str | Path, log_format: str) -> ImportedLog | None:
     """Return a recording that this package saved, as it is; None for anything else."""
     file = Path(path).expanduser()
-    if log_format == "auto" and not _is_saved(file):
+    if log_format == "auto" and not (file.is_file() and _begins_saved(file)):
         return None
     recording = Recording.load(file)
     report = ImportReport(str(path), "recording")
@@ -186,11 +186,6 @@ def _own_note(recording: Recording, source: str) -> CommandNote | None:
 def _scenario(recording: Recording, source: str) -> Scenario | None:
     stated = recording.meta.get("scenario")
     return Scenario.from_dict(stated, source) if isinstance(stated, Mapping) else None
-
-
-def _is_saved(file: Path) -> bool:
-    # A pipe or a device would be waited for; the reader says what it is.
-    return file.is_file() and _begins_saved(file)
 
 
 def _begins_saved(file: Path) -> bool:

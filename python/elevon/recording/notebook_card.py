@@ -19,14 +19,10 @@ def recording_card(recording: Recording) -> Html:
     meta = recording.meta
     facts: list[tuple[str, object]] = [("", badge(recording.status))]
     facts += [("", meta[name]) for name in ("message", "actuator", "fidelity") if meta.get(name)]
-    facts += [("clock", _clock(clock)) for clock in recording.clocks.values()]
+    facts += [("clock", repr(clock)[len("Clock(") : -1]) for clock in recording.clocks.values()]
     rows = [_row(channel, len(recording.clocks) > 1) for channel in recording.channels]
     head = ["channel", "unit", "least", "greatest", "last", "", "what it is"]
     return card("Recording", facts, table(head, rows))
-
-
-def _clock(clock: object) -> str:
-    return repr(clock).removeprefix("Clock(").removesuffix(")")
 
 
 def _row(channel: Channel, name_clock: bool) -> list[object]:

@@ -157,16 +157,14 @@ def speed_control(ctx: Context) -> None:
     else:
         # A speed read late by d integrates to d less: what is left of its gain is K (1 - z d), that
         # of the set point, which the unit computes itself, is K.
-        gain, zero = fit.of(lambda b: float(b[0] + b[2])), fit.of(_zero)
+        gain, zero = (
+            fit.of(lambda b: float(b[0] + b[2])),
+            fit.of(lambda b: float(b[1] / (b[0] + b[2]))),
+        )
         # Whether set points are recorded before or after their tick is open.
         late = abs(fit["integral"]) * value("control.sample_time")
         zero = zero.widened(late * zero.value / gain.value)
         ctx.add({paths[0]: gain.widened(late), paths[1]: zero.inverted()})
-
-
-def _zero(fitted: Floats) -> float:
-    """Return one over the integral time, of the coefficients of a speed loop."""
-    return float(fitted[1] / (fitted[0] + fitted[2]))
 
 
 def unit_gains(ctx: Context) -> None:

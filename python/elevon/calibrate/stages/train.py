@@ -88,7 +88,8 @@ def torque_balance(parts: Sequence[Driving], known: Constants) -> TrainBalance:
     moves = ("extension", "retraction")
     paths = [f"friction.ffm_{direction}_{k}" for direction in moves for k in range(1, KNOTS + 1)]
     open_paths = [path for path in paths if path not in known.friction]
-    loaded = [part for part in parts if _knows_load(part, known.actuator)]
+    factor = known.actuator.parameters.value("load.factor")
+    loaded = [part for part in parts if "load" in part.channels or factor > 0.0]
     if not loaded:
         why = "no motion in which the motor drives under a known load"
         return TrainBalance(
@@ -140,10 +141,6 @@ def _choices(
 
 def _direction(part: Driving) -> str:
     return "extension" if part.move.extending else "retraction"
-
-
-def _knows_load(part: Driving, actuator: Actuator) -> bool:
-    return "load" in part.channels or actuator.parameters.value("load.factor") > 0.0
 
 
 def axial_load(part: Driving, actuator: Actuator) -> Floats:

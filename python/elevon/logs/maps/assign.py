@@ -182,15 +182,11 @@ def _mapped(entry: ColumnEntry, table: RawTable, gear_ratio: float | None) -> As
         entry.channel,
         entry.name,
         factor,
-        _si(expected),
+        si_unit(expected),
         offset,
         "" if entry.role_name == "time" else entry.role_name,
         entry.subtract_from,
     )
-
-
-def _si(unit: str) -> str:
-    return si_unit(unit)
 
 
 def _add_drive(assigned: dict[str, Assignment], table: RawTable) -> None:

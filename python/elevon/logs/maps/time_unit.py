@@ -61,7 +61,7 @@ def _by_motion(time: Floats, table: RawTable, columns: Mapping[str, GuessedColum
     steps = np.diff(time, prepend=time[0])
     for place, unit in _stated(_PLACES, table, columns):
         for rate, per_time in _stated(_SPEEDS, table, columns):
-            if not _is_rate(per_time, unit):
+            if per_time.dimension != parse_unit(f"{unit.text}/s").dimension:
                 continue
             slope, explained = slope_and_fit(np.cumsum(rate * steps), place)
             for name, scale in TIME_UNITS.items():
@@ -81,8 +81,3 @@ def _stated(
             unit = parse_unit(item.unit)
             chosen.append((np.asarray(values * unit.factor, dtype=np.float64), unit))
     return chosen
-
-
-def _is_rate(rate: Unit, place: Unit) -> bool:
-    """Whether a unit is that of a place over time, such as mm/s and m."""
-    return rate.dimension == parse_unit(f"{place.text}/s").dimension
