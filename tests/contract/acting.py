@@ -12,6 +12,8 @@ from typing import Any
 from elevon.parameters import records
 from tests.contract.cells import Cell, Variant, fault, severe
 
+#: A threshold this much above another number of its unit is crossed at once.
+JUST_ABOVE = 1.00004
 #: Steps away from a value, and numbers of every size for those that are zero.
 FACTORS = (1.3, 0.7, 0.02, 50.0)
 SIZES = (0.1, 1e-3, 1.0, 30.0, 1e-6, 1e3, -0.1, -1.0, 0.0)
@@ -130,7 +132,7 @@ def companies(cell: Cell, path: str) -> Iterator[Variant]:
     for broken in (*_faults(cell, path), *_spoken_faults(cell, path)):
         yield Variant(values=first.values, faults=(broken,))
     for company in plain[:2] or [Variant()]:
-        for values in _neighbours(cell, path):
+        for values in _neighbours(cell, path, company):
             yield Variant(values={**company.values, **values})
 
 
@@ -154,7 +156,7 @@ def _faults(cell: Cell, path: str) -> Iterator[Any]:
     yield fault(kind, place, record, 0.5 * severe(record), {"kind": "ramp", "end": 2.0 * half})
 
 
-def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
+def _neighbours(cell: Cell, path: str, base: Variant) -> Iterator[dict[str, Any]]:
     """Yield other values of the parameters of the same group, all at once and one at a time.
 
     Those whose names share most words with its own come first: knot 8 of a table needs speed 8.
@@ -179,11 +181,27 @@ def _neighbours(cell: Cell, path: str) -> Iterator[dict[str, Any]]:
         for factor in FACTORS:
             scaled = {other: numbers[other] * factor for other in alike}
             yield {other: value for other, value in scaled.items() if inside(known[other], value)}
-    # A limit acts only where the others of its kind leave it room.
-    alike = [other for other in moved if known[other].unit == known[path].unit != ""]
-    yield from ({other: value} for other in alike for value in moved[other])
+    # A limit acts only where those that it must keep away from leave it room.
+    named = _refusing(cell, path, base)
+    near = [other for other in moved if other in named]
+    yield from ({other: value} for other in near for value in moved[other])
+    # A threshold is crossed in a short run where it stands just above what is there already.
+    alike = [
+        other for other, value in numbers.items() if known[other].unit == known[path].unit and value
+    ]
+    pairs = ((a, JUST_ABOVE * numbers[b]) for a in alike for b in alike if a != b)
+    yield from islice(({a: value} for a, value in pairs if inside(known[a], value)), SPOKEN)
     yield from _spoken_of(cell, path)
-    yield from ({other: value} for other in moved if other not in alike for value in moved[other])
+    far = {other: values for other, values in moved.items() if other not in near}
+    yield from ({other: value} for other, values in far.items() for value in values)
+
+
+def _refusing(cell: Cell, path: str, base: Variant) -> set[str]:
+    """Names in the reasons why other values of a parameter are refused."""
+    record = records(cell.actuator().wiring)[path]
+    values = others(record, cell.actuator(base.values).parameters[path].value)
+    refusals = (cell.refused(Variant(values={**base.values, path: value})) for value in values)
+    return {name for text in refusals for name in re.findall(r"[a-z_]+(?:\.\w+)+", text)}
 
 
 def _words(cell: Cell, path: str) -> set[str]:

@@ -117,7 +117,7 @@ def test_the_times_say_which_steps_were_resumed():
     for used, columns in ((steps, 3), (steps[:1], 2)):
         report = Report("t")
         demo = SimpleNamespace(steps=used, seconds=sum(step.seconds for step in used))
-        page._times(report, demo)
+        page.times_section(report, demo)
         table = report.sections[0].items[0]["table"]
         assert len(table.columns) == columns
         assert [line[0] for line in table.rows] == [*(step.name for step in used), "all"]

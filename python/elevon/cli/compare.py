@@ -10,6 +10,7 @@ import typer
 from elevon.cli import common
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
+from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -39,7 +40,6 @@ def compare(
     from elevon.cli.fault_options import read_faults
     from elevon.compare import default_scenario, default_start
     from elevon.doors import compare as run
-    from elevon.errors import InputError
     from elevon.scenario import Scenario
 
     if load is not None and not loads:

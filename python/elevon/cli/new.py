@@ -56,8 +56,7 @@ def new(
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if base is not None and not (numbers or linear or rotary):
         return _variant(path, base, force=force)
-    wanted = New(path, numbers, linear, rotary, base, title, source)
-    made = wanted.write(bench, force=force)
+    made = New(path, numbers, linear, rotary, base, title, source).write(bench, force=force)
     return Answer(made.data(), lambda: answer(*made.lines()))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from elevon.calibrate.validation import SIGNALS
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 
     from elevon.calibrate.validation import ValidationTrace
     from elevon.demo.run import Demo
+    from elevon.demo.steps import Story
     from elevon.logs.importing import ImportedLog
+    from elevon.report.checks import Check
     from elevon.report.document import Section
 
 _DISPLAYED = {
@@ -53,18 +56,15 @@ def demo_report(demo: Demo) -> Report:
     _agreement(report, demo)
     _clocks(report, demo)
     _backlash(report, demo)
-    _times(report, demo)
-    report.section("Checks").checks(demo.checks)
-    report.provenance(
-        provenance(
-            "elevon demo",
-            **{
-                "Seed": demo.seed,
-                "Published set": demo.base.hash,
-                "Hidden set": demo.hidden.hash,
-            },
-        )
-    )
+    times_section(report, demo)
+    return closed(report, demo, demo.checks)
+
+
+def closed(report: Report, demo: Story, checks: Sequence[Check]) -> Report:
+    """Return a demonstration's page with what each ends with: checks, and what it was made from."""
+    report.section("Checks").checks(checks)
+    sets = {"Seed": demo.seed, "Published set": demo.base.hash, "Hidden set": demo.hidden.hash}
+    report.provenance(provenance("elevon demo", **sets))
     return report
 
 
@@ -231,7 +231,8 @@ def _backlash(report: Report, demo: Demo) -> None:
     )
 
 
-def _times(report: Report, demo: Demo) -> None:
+def times_section(report: Report, demo: Story) -> None:
+    """Add the time of each step."""
     rows: list[list[object]] = [[step.name, step.seconds, step.reused] for step in demo.steps]
     rows.append(["all", demo.seconds, ""])
     resumed = any(step.reused for step in demo.steps)

@@ -124,8 +124,7 @@ def prepare(
     compiled = compile_scenario(run.scenario, actuator.wiring, fidelity)
     check_stroke(compiled, actuator)
     bare = features is not None and record is not None and not len(record)
-    texts = record if isinstance(record, str) or record is None else tuple(record)
-    plan = () if bare else _clocks(texts, actuator.wiring, fidelity, step)
+    plan = () if bare else _clocks(record, actuator.wiring, fidelity, step)
     summed = feature_plans(
         features,
         actuator.wiring,
@@ -173,11 +172,16 @@ def _core_run(run: Run, actuator: Actuator, compiled: CompiledScenario) -> dict[
     }
 
 
+def _clocks(record: Record, wiring: str, fidelity: str, step: float) -> tuple[ClockPlan, ...]:
+    """Return what is kept, of runs of one model and step."""
+    texts = record if isinstance(record, str) or record is None else tuple(record)
+    return _planned(texts, wiring, fidelity, step)
+
+
 @lru_cache(maxsize=256)
-def _clocks(
+def _planned(
     record: str | tuple[str, ...] | None, wiring: str, fidelity: str, step: float
 ) -> tuple[ClockPlan, ...]:
-    """Return what is kept, of runs of one model and step."""
     return tuple(record_plan(record, signal_units(wiring, fidelity), step))
 
 

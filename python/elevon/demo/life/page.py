@@ -12,10 +12,10 @@ from elevon.demo.life.figures import (
 )
 from elevon.demo.life.mechanism import mechanism, motion
 from elevon.demo.life.unit import FACTORS
+from elevon.demo.page import closed, times_section
 from elevon.logs.read import read_drive_logs
 from elevon.prognose.figures import severity_unit
 from elevon.report import Report, ReportTable
-from elevon.reproduce.provenance import provenance
 from elevon.units import to_display
 
 if TYPE_CHECKING:
@@ -62,15 +62,8 @@ def life_report(demo: LifeDemo) -> Report:
     _diagnoses(report, demo)
     _prediction(report, demo)
     _calibration(report, demo)
-    _times(report, demo)
-    report.section("Checks").checks(demo.checks)
-    report.provenance(
-        provenance(
-            "elevon demo",
-            **{"Seed": demo.seed, "Published set": demo.base.hash, "Hidden set": demo.hidden.hash},
-        )
-    )
-    return report
+    times_section(report, demo)
+    return closed(report, demo, demo.checks)
 
 
 def _actuator(report: Report, demo: LifeDemo) -> None:
@@ -199,15 +192,5 @@ def _calibration(report: Report, demo: LifeDemo) -> None:
             rows,
             "Estimates with 90 % intervals.",
             digits=4,
-        )
-    )
-
-
-def _times(report: Report, demo: LifeDemo) -> None:
-    rows: list[list[object]] = [[step.name, step.seconds, step.reused] for step in demo.steps]
-    rows.append(["all", demo.seconds, ""])
-    report.section("Time of each step").table(
-        ReportTable(
-            ("step", "time [s]", ""), rows, "Wall time of this run.", formats=["", ".1f", ""]
         )
     )
