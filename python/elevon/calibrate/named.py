@@ -43,10 +43,9 @@ def named(
     if record is not None:
         unit, register, old = record.unit, record.register, actuator.parameters.value(path)
         number = number.within(low=record.minimum)
-    elif not unit:
-        about = packaged_toml("elevon.calibrate", "derived.toml")[path.partition("[")[0]]
-        unit, register = about["unit"], about.get("register", register)
-        note = about["note"] if note is None else note
+    elif about := packaged_toml("elevon.calibrate", "derived.toml").get(path.partition("[")[0]):
+        unit, register = unit or about["unit"], about.get("register", register)
+        note = about["note"] if note is None and source == "signals" else note
     return replace(
         number, path=path, unit=unit, register=register, old=old, source=source, given=given,
         note=note or "", in_set=has_place if in_set is None else in_set,
