@@ -2,7 +2,8 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +13,28 @@ from elevon.recording.channel import Channel, in_si
 from elevon.recording.channel_set import ChannelSet
 from elevon.recording.clock import Clock
 from elevon.recording.convert import to_arrow, to_pandas, to_xarray
-from elevon.recording.formats import load, save
 from elevon.recording.header import Header, plain
-from elevon.recording.old import warn_of_old_names
-from elevon.recording.plot import plot
+
+if TYPE_CHECKING:
+    from elevon.recording.formats import save as _save
+    from elevon.recording.plot import plot as _plot
 
 MAX_BYTES = 8 * 2**30
+
+
+class _Later:
+    """A method whose module is imported when it is first looked up: `import elevon` stays light."""
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._owner, self._name = owner, name
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        function = getattr(import_module(self._module), self._name)
+        setattr(self._owner, self._name, function)
+        return function.__get__(instance, owner)
 
 
 class Recording(ChannelSet):
@@ -236,8 +253,12 @@ class Recording(ChannelSet):
     to_pandas = to_pandas
     to_xarray = to_xarray
     to_arrow = to_arrow
-    plot = plot
-    save = save
+    if not TYPE_CHECKING:
+        plot = _Later("elevon.recording.plot")
+        save = _Later("elevon.recording.formats")
+    else:
+        plot = _plot
+        save = _save
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], *, max_bytes: int = MAX_BYTES) -> "Recording":
@@ -257,8 +278,12 @@ class Recording(ChannelSet):
         InputError
             No such file, or an ending that is not a format.
         """
+        from elevon.recording.formats import load
+
         loaded = dict(vars(load(path, max_bytes=max_bytes)))
         if old := loaded.pop("old"):
+            from elevon.recording.old import warn_of_old_names
+
             warn_of_old_names(path, old, 2)
         try:
             return cls(**loaded)
