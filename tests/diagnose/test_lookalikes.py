@@ -14,6 +14,7 @@ from elevon.diagnose.positions.plausibility import PLAUSIBLE
 
 GAIN = next(c for c in CANDIDATES if c.key == "gain@sensor.encoder")
 FRICTION = next(c for c in CANDIDATES if c.key == "friction@transmission")
+SPEED = next(c for c in CANDIDATES if c.key == "gain_drift@control.speed")
 
 
 def other(c, severity, name, mean, value, expected=None):
@@ -44,3 +45,10 @@ def test_an_encoders_gain_is_told_from_an_error_once_a_turn_by_a_long_stroke_onl
 def test_dry_friction_scales_what_falls_with_speed_another_law_moves_it_anyhow():
     assert other(FRICTION, 0.5, "creeping_current", 4.0, 6.0) < 0.1
     assert other(FRICTION, 0.5, "creeping_current", 4.0, 14.0) > 0.5
+
+
+def test_a_speed_gain_leaves_the_ratio_to_its_integral_another_integral_time_moves_it():
+    assert other(SPEED, 0.3, "integral_rate", 10.0, 10.0) < 0.1
+    assert other(SPEED, 0.1, "integral_rate", 10.0, 2.0) > 0.9
+    # Of a slow log a great gain moves the ratio, too: nothing is refuted.
+    assert other(SPEED, 0.5, "integral_rate", 10.0, 5.0) < 0.15

@@ -106,9 +106,10 @@ _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _RINGS = tuple(f"bearing.{p}" for p in ("outer", "inner", "ball"))
 _CURRENTS = tuple(f"sensor.current_{p}" for p in "abc")
 _LOOP_NOISE = ("target_noise", "control_noise", "voltage_noise", "voltage_rest")
-#: What a loop of a greater gain amplifies, by its place.
+#: What a loop of a greater gain amplifies or moves, by its place.
 _AMPLIFIED = {
-    "control.position": ("reference_noise", *_LOOP_NOISE), "control.speed": _LOOP_NOISE,
+    "control.position": ("reference_noise", *_LOOP_NOISE),
+    "control.speed": ("integral_rate", *_LOOP_NOISE),
 }  # fmt: skip
 _RIPPLES = ("current_order_1", "current_order_2", "current_shaft", "current_sideband")
 _VOLTAGES = ("voltage_per_speed", "voltage_order_1", "voltage_order_2", "voltage_sideband")

@@ -38,10 +38,13 @@ class Lookalike:
         In words.
     tells : str
         Plausibility feature that tells it from the candidate.
+    scaled : bool
+        Whether the candidate scales that feature; else it may move it by its share, either way.
     """
 
     text: str
     tells: str = ""
+    scaled: bool = False
 
 
 _ONCE_A_TURN = Lookalike("an error of gear or sensor once a turn", "position_cubic")
@@ -50,7 +53,10 @@ LOOKALIKES = {
     "backlash": Lookalike("wind-up of a soft part under the friction behind it"),
     "gain@sensor.encoder": _ONCE_A_TURN,
     "gain@sensor.resolver": _ONCE_A_TURN,
-    "friction": Lookalike("friction that changes with speed or load", "creeping_current"),
+    "friction": Lookalike("friction that changes with speed or load", "creeping_current", True),
+    "gain_drift@control.speed": Lookalike(
+        "another integral time of the speed controller", "integral_rate"
+    ),
 }
 
 
@@ -100,24 +106,26 @@ def _odds(cases: Sequence[LogCase], c: CandidateFault, severity: float) -> float
     ratio = 1.0
     for case in cases:
         if like.tells in case.plausible.names:
-            ratio *= _ratio(case, c, like.tells, severity)
+            ratio *= _ratio(case, c, like, severity)
     return SHARE * ratio
 
 
-def _ratio(case: LogCase, c: CandidateFault, name: str, severity: float) -> float:
+def _ratio(case: LogCase, c: CandidateFault, like: Lookalike, severity: float) -> float:
     """Likelihood of what tells them under the lookalike over that under the candidate."""
     from scipy.stats import t as student
 
+    name = like.tells
     k = case.plausible.names.index(name)
     score, std = float(case.plausible.score[k]), float(case.plausible.std[k])
     degrees = case.plausible.degrees
-    if name in c.amplified:  # the candidate scales it, the other moves it anyhow
-        off = score - severity * float(case.plausible.mean[k]) / std
+    if name in c.amplified:  # the other moves it anyhow
+        own = severity * float(case.plausible.mean[k]) / std
+        off, wide = (score - own, 1.0) if like.scaled else (score, float(np.hypot(1.0, own)))
         density = student.pdf(off, degrees, scale=np.hypot(1.0, _WIDE))
-        return float(np.mean(density) / student.pdf(off, degrees))
+        return float(np.mean(density) / student.pdf(off, degrees, scale=wide))
     moved = case.item.lookalike_moves(c.key, severity).get(name) if case.item is not None else None
     if moved is None:
         return 1.0
     wide = float(np.hypot(1.0, _UNSURE * moved / std))
-    like = student.pdf(score - moved / std, degrees, scale=wide)
-    return float(like / student.pdf(score, degrees))
+    density = student.pdf(score - moved / std, degrees, scale=wide)
+    return float(density / student.pdf(score, degrees))

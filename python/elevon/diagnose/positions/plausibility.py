@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.table import Feature, FeatureTable, FeatureVector
+from elevon.diagnose.engine.table import Feature, FeatureTable, FeatureVector, deviations
 from elevon.diagnose.positions.features import (
     LEAST,
     SLOW,
@@ -24,6 +24,7 @@ from elevon.diagnose.positions.features import (
     local_mean,
     local_slope,
     median,
+    regress,
 )
 from elevon.diagnose.positions.lost_motion import carried
 
@@ -71,6 +72,8 @@ PLAUSIBLE: FeatureTable = {
         Feature("target_noise", "A", "noise of the current set point", (0.12, 0.005)),
         Feature("control_noise", "A", "noise of what the speed controller's law leaves",
                 (0.15, 0.005)),
+        Feature("integral_rate", "1/s", "speed controller's integral over its gain",
+                (0.15, 0.03)),
         Feature("reference_noise", "rad/s", "noise of the speed set point", (0.15, 2e-3)),
         Feature("voltage_rest", "V", "scatter of the voltage", (0.10, 0.1)),
         Feature("voltage_noise", "V", "noise of the voltage", (0.10, 0.1)),
@@ -204,12 +207,26 @@ def _control(log: Log, width: float) -> dict[str, float]:
     size = np.abs(log.speed_ref)
     inside = log.good & (size < 0.999 * float(size.max()))
     columns = [error, np.cumsum(error) * width, np.gradient(error, width), np.ones_like(error)]
-    _, (left,) = _left(columns, [log.current_target], inside)
-    return {
+    beta, covariance = regress([column[inside] for column in columns], log.current_target[inside])
+    left = log.current_target[inside] - sum(
+        b * column[inside] for b, column in zip(beta, columns, strict=True)
+    )
+    return _integral_rate(beta, covariance) | {
         "target_noise": _noise(log.current_target, log.good),
         "control_noise": _noise(left, np.ones(len(left), dtype=np.bool_)),
         "reference_noise": _noise(log.speed_ref, log.good),
     }
+
+
+def _integral_rate(beta: Floats, covariance: Floats) -> dict[str, float]:
+    """Return the integral's weight over the error's, where the log says it better than days do."""
+    if not beta[0]:
+        return {}
+    record, rate = PLAUSIBLE["integral_rate"], float(beta[1] / beta[0])
+    slope = np.array([-rate, 1.0]) / beta[0]
+    variance = float(slope @ covariance[:2, :2] @ slope)
+    known = variance <= float(deviations([record], np.array([rate]), "repeats")[0]) ** 2
+    return {"integral_rate": rate} if known else {}
 
 
 def _voltages(log: Log, moving: Bools, columns: Sequence[Floats]) -> dict[str, float]:
