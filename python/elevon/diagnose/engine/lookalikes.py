@@ -119,8 +119,8 @@ def _ratio(case: LogCase, c: CandidateFault, like: Lookalike, severity: float) -
     score, std = float(case.plausible.score[k]), float(case.plausible.std[k])
     degrees = case.plausible.degrees
     if name in c.amplified:  # the other moves it anyhow
-        own = severity * float(case.plausible.mean[k]) / std
-        off, wide = (score - own, 1.0) if like.scaled else (score, float(np.hypot(1.0, own)))
+        shift = severity * float(case.plausible.mean[k]) / std
+        off, wide = (score - shift, 1.0) if like.scaled else (score, float(np.hypot(1.0, shift)))
         density = student.pdf(off, degrees, scale=np.hypot(1.0, _WIDE))
         return float(np.mean(density) / student.pdf(off, degrees, scale=wide))
     moved = case.item.lookalike_moves(c.key, severity).get(name) if case.item is not None else None
