@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,19 @@ def _copy(folder):
     done = subprocess.run(commit, capture_output=True, text=True, check=True)
     (folder / "python/elevon/cli/commit.txt").write_text(done.stdout, "utf-8")
     return done.stdout.strip()
+
+
+@pytest.mark.skipif(shutil.which("cargo") is None, reason="no cargo")
+def test_the_sdist_holds_every_file_of_the_package(tmp_path):
+    """Tables and pages, too: a wheel is built of nothing else."""
+    maturin = Path(sys.executable).with_name("maturin")
+    subprocess.run([maturin, "sdist", "--out", tmp_path], cwd=ROOT, check=True, capture_output=True)
+    (archive,) = tmp_path.glob("elevon-*.tar.gz")
+    with tarfile.open(archive) as packed:
+        names = {name.partition("/")[2] for name in packed.getnames()}
+    git = ["git", "-C", str(ROOT), "ls-files", "-z", "python"]
+    tracked = subprocess.run(git, capture_output=True, text=True, check=True).stdout.split("\0")
+    assert [name for name in tracked if name and name not in names] == []
 
 
 @pytest.fixture
