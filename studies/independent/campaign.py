@@ -310,7 +310,10 @@ def _answer(
 
 @one_blas_thread()
 def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
-    """Healthy days of another actuator, made by the package's own switching model."""
+    """Healthy days of another actuator, made by the package's own switching model.
+
+    Each has the days after it as baselines: one bad baseline spoils one answer, not all.
+    """
     from elevon import Actuator
     from studies.fault_limits.standard import Day, day_logs, standard_tests
 
@@ -321,9 +324,14 @@ def _switching(name: str, title: str, plan: Plan) -> list[Judged]:
     unit = Unit(0, None, None, RATES[0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ElevonWarning)
-        logs = day_logs(actuator, test, days, "high")
-        base = [replace(log, name=f"baseline {k}") for k, log in enumerate(logs[:most])]
-        first = [reading_of(log, actuator) for log in base]
-        judge = _Judge(unit, title, actuator, first).of
-        rows = [judge("healthy", "", log, count) for log in logs[most:] for count in _FEW]
+        logs = [
+            replace(log, name=f"day {k}")
+            for k, log in enumerate(day_logs(actuator, test, days, "high"))
+        ]
+        read = [reading_of(log, actuator) for log in logs]
+        rows = []
+        for k, log in enumerate(logs[: plan.switching]):
+            base = [read[(k + 1 + j) % len(read)] for j in range(most)]
+            judge = _Judge(unit, title, actuator, base).of
+            rows += [judge("healthy", "", log, count) for count in _FEW]
     return [replace(row, program=name) for row in rows]
