@@ -48,9 +48,11 @@ class Lookalike:
 
 
 _ONCE_A_TURN = Lookalike("an error of gear or sensor once a turn", "position_cubic")
+_WIND_UP = Lookalike("wind-up of a soft part under the friction behind it")
 #: By kind of a fault, or ``KIND@PLACE``.
 LOOKALIKES = {
-    "backlash": Lookalike("wind-up of a soft part under the friction behind it"),
+    "backlash": _WIND_UP,
+    "adapter_gap": _WIND_UP,
     "gain@sensor.encoder": _ONCE_A_TURN,
     "gain@sensor.resolver": _ONCE_A_TURN,
     "friction": Lookalike("friction that changes with speed or load", "creeping_current", True),
