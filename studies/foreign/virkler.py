@@ -9,9 +9,9 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.prognose import Coefficient, Inspection, Law, ResponseTables, Seen
-from elevon.prognose.grid import Grid
 from elevon.prognose.mission import Mission
 from elevon.prognose.requirement import Requirement
+from elevon.prognose.response import Grid
 from studies.foreign.truth import Case, ForeignLife, visits
 
 EXPONENTS = (2.0, 2.5, 2.9, 3.5)

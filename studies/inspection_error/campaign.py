@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.errors import ElevonWarning, InputError
-from elevon.prognose.laws import LAWS
+from elevon.prognose.law import LAWS
 from elevon.prognose.observation import inspection
 from elevon.progress import Progress, part
 from elevon.worklog import WorkLog, finished

@@ -11,7 +11,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.modelfree.scores import share_interval
-from elevon.prognose.laws import LAWS
+from elevon.prognose.law import LAWS
 from elevon.prognose.observation import SIGMAS
 from elevon.progress import Progress
 from elevon.report import Check, verdict

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from elevon.prognose.metric_figures import metrics_figure
+from elevon.prognose.metrics import metrics_figure
 from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
 from studies.prognosis.result import SHARES, PrognosisResult

@@ -11,12 +11,11 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.demo.life.unit import other_law
 from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.prognose.future import Life, run_to_failure
 from elevon.prognose.law import Law
-from elevon.prognose.life import Life, run_to_failure
-from elevon.prognose.measured import Measured
-from elevon.prognose.observation import SIGMAS, Inspection, Seen, inspection
+from elevon.prognose.observation import SIGMAS, Inspection, Measured, Seen, inspection
 from elevon.prognose.process import Process
-from elevon.prognose.respond import respond
+from elevon.prognose.tabulate import respond
 from studies.diagnosis_limits.unit import DAILY
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from elevon import Actuator
 from elevon.cli import main
 from elevon.demo.life.mechanism import Motion, mechanism, motion
 from elevon.demo.life.unit import demo_mission, faults_at, hidden_unit, of_day
-from elevon.prognose.life import Life
+from elevon.prognose.future import Life
 
 
 @pytest.fixture(scope="module")

@@ -15,10 +15,10 @@ from elevon.demo.life.results import Statement
 from elevon.demo.life.unit import demo_mission
 from elevon.plain import plain, read_plain
 from elevon.prognose import ResponseTables
-from elevon.prognose.grid import Grid
-from elevon.prognose.life import Life
+from elevon.prognose.future import Life
 from elevon.prognose.predict import prognosis
 from elevon.prognose.requirement import Requirement
+from elevon.prognose.response import Grid
 from elevon.report import Report
 from tests.patches import put
 

@@ -7,8 +7,7 @@ import pytest
 from elevon.diagnose.engine.answer import Cause, Diagnosis
 from elevon.errors import InputError, OutputExistsError
 from elevon.prognose import LAWS
-from elevon.prognose.append import next_entry
-from elevon.prognose.history import read_history
+from elevon.prognose.history import next_entry, read_history
 
 KEY = "backlash@transmission"
 

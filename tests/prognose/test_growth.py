@@ -8,11 +8,10 @@ import pytest
 
 from elevon.errors import RangeError, UnknownNameError
 from elevon.prognose import LAWS
-from elevon.prognose.future import look_ahead
-from elevon.prognose.grid import Grid
+from elevon.prognose.future import look_ahead, run_to_failure
 from elevon.prognose.law import DRIVERS
-from elevon.prognose.life import run_to_failure
 from elevon.prognose.mission import Usage
+from elevon.prognose.response import Grid
 from tests.prognose.units import end, law, process
 
 USE = {

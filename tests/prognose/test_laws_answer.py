@@ -5,7 +5,7 @@ import pytest
 
 from elevon import Actuator
 from elevon.prognose import LAWS, Inspection, Mission, Seen, predict, respond
-from elevon.prognose.laws import laws_of
+from elevon.prognose.law import laws_of
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
 ACTUATORS = {"torino-rotary": "rotary", "nasa-ballscrew": "ballscrew",

@@ -8,11 +8,11 @@ import pytest
 from elevon.errors import FormatError, InputError
 from elevon.prognose import LAWS, GrowthFilter, Inspection, Process, ResponseTables, Seen
 from elevon.prognose.future import LASTING, MODEL_ERROR, look_ahead
-from elevon.prognose.grid import Grid
 from elevon.prognose.history import read_history
-from elevon.prognose.measured import Measured, governing, read_measured
 from elevon.prognose.mission import Usage
+from elevon.prognose.observation import Measured, governing, read_measured
 from elevon.prognose.requirement import Requirement
+from elevon.prognose.response import Grid
 from tests.prognose.units import law
 
 KEY, UNITS = "backlash@transmission", {"current": "A", "error": "rad"}

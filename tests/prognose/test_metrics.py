@@ -77,7 +77,7 @@ def test_tracks_that_are_none():
 
 
 def test_the_picture_shows_each_metric_at_its_value():
-    from elevon.prognose.metric_figures import metrics_figure
+    from elevon.prognose.metrics import metrics_figure
 
     tracks = [track(0.0), track(5.0), track(30.0, width=1.0)]
     wedge, band, rates = metrics_figure(tracks, shares=(0.5, 0.9)).axes

@@ -14,7 +14,7 @@ from elevon.prognose.answer import Prognosis
 from elevon.prognose.fleet import Costs, plan_fleet
 from elevon.prognose.future import Future
 from elevon.prognose.history import read_history
-from elevon.prognose.laws import laws_of
+from elevon.prognose.law import laws_of
 from elevon.prognose.next_inspection import next_inspection
 from elevon.prognose.tabulate import severity_grid
 from tests.prognose.test_predict import FLIGHT, KEY

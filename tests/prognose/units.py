@@ -3,8 +3,8 @@
 import numpy as np
 
 from elevon.prognose import Coefficient, Law, Process, ResponseTables
-from elevon.prognose.grid import Grid
 from elevon.prognose.requirement import Requirement
+from elevon.prognose.response import Grid
 
 
 def law(rate=1e-3, kind="backlash", *, power=0.0, rate_spread=0.0, **fields):

@@ -10,9 +10,9 @@ import pytest
 from elevon import Actuator
 from elevon.errors import InputError, Interrupted
 from elevon.prognose import ResponseTables
-from elevon.prognose.grid import Grid
-from elevon.prognose.life import Life
+from elevon.prognose.future import Life
 from elevon.prognose.metrics import Track
+from elevon.prognose.response import Grid
 from studies import main
 from studies.prognosis import campaign
 from studies.prognosis.campaign import (

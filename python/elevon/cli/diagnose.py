@@ -16,7 +16,7 @@ from elevon.number_text import severity_texts
 
 if TYPE_CHECKING:
     from elevon.diagnose.engine.answer import Cause, Diagnosis
-    from elevon.prognose.append import NextEntry
+    from elevon.prognose.history import NextEntry
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -61,7 +61,7 @@ def _inspection(
     history: Path | None, usage: str | None, actuator: str, *, force: bool
 ) -> NextEntry | None:
     """Return where the answer is added; refused before the work where it cannot be."""
-    from elevon.prognose.append import next_entry
+    from elevon.prognose.history import next_entry
 
     if history is None and usage is None:
         return None

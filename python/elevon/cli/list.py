@@ -154,7 +154,7 @@ def laws(
 ) -> Answer:
     """List the laws by which faults grow with use: fault, unit, what drives them, source."""
     from elevon.actuator import Actuator
-    from elevon.prognose.laws import LAWS, laws_of
+    from elevon.prognose.law import LAWS, laws_of
 
     known = LAWS if actuator is None else laws_of(Actuator.load(actuator).wiring)
     rows = [

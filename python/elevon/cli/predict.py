@@ -42,7 +42,7 @@ def predict(
 
 
 def _print(result: Prognosis) -> None:
-    from elevon.prognose.figures import severity_unit
+    from elevon.prognose.page import severity_unit
     from elevon.units import to_display
 
     answer(result.headline)

@@ -8,14 +8,13 @@
 
 from elevon.prognose.answer import Prognosis
 from elevon.prognose.growth import GrowthFilter
-from elevon.prognose.law import Coefficient, Law
-from elevon.prognose.laws import LAWS
+from elevon.prognose.law import LAWS, Coefficient, Law
 from elevon.prognose.mission import Mission
 from elevon.prognose.observation import Inspection, Seen, inspection
 from elevon.prognose.predict import predict
 from elevon.prognose.process import Process
-from elevon.prognose.respond import respond
 from elevon.prognose.response import ResponseTables
+from elevon.prognose.tabulate import respond
 
 __all__ = [
     "LAWS",

@@ -190,7 +190,7 @@ class Prognosis(Result):
 
     def plot(self) -> Figure:
         """Return the probability of surviving over use."""
-        from elevon.prognose.figures import survival_figure
+        from elevon.prognose.page import survival_figure
 
         return survival_figure(self)
 

@@ -12,16 +12,15 @@ from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.engine.candidates import CandidateFault, candidates_of
 from elevon.errors import InputError
 from elevon.prognose.answer import Prognosis
-from elevon.prognose.assumptions import assumptions
 from elevon.prognose.fleet import Costs, FleetPlan, plan_fleet
 from elevon.prognose.history import History, diagnosed, read_history
 from elevon.prognose.mission import Mission
-from elevon.prognose.next_inspection import NextInspection
+from elevon.prognose.next_inspection import NextInspection, assumptions
 from elevon.prognose.next_inspection import next_inspection as when_to_look
 from elevon.prognose.observation import Inspection, inspection
 from elevon.prognose.page import prognosis_page
 from elevon.prognose.predict import predict as look_ahead
-from elevon.prognose.respond import respond
+from elevon.prognose.tabulate import respond
 from elevon.progress import Progress, part
 from elevon.simulate.arguments import as_actuator
 

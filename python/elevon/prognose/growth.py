@@ -10,8 +10,7 @@ from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.prognose.bank import FaultBank
 from elevon.prognose.future import LASTING, MODEL_ERROR
-from elevon.prognose.measured import Measured, governing
-from elevon.prognose.observation import Inspection, Seen
+from elevon.prognose.observation import Inspection, Measured, Seen, governing
 from elevon.prognose.process import ONSET, Process, UnitPopulation
 
 COUNT = 2000

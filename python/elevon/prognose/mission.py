@@ -21,8 +21,7 @@ from pydantic import (
 
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
-from elevon.prognose.law import Law
-from elevon.prognose.laws import find_law
+from elevon.prognose.law import Law, find_law
 from elevon.prognose.requirement import Requirement
 from elevon.scenario import Scenario
 from elevon.units import parse_quantity

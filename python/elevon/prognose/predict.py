@@ -17,8 +17,8 @@ from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.growth import COUNT, GrowthFilter
 from elevon.prognose.observation import Inspection
 from elevon.prognose.process import Process
-from elevon.prognose.respond import respond
 from elevon.prognose.response import ResponseTables, check_start
+from elevon.prognose.tabulate import respond
 from elevon.units import to_display
 
 if TYPE_CHECKING:

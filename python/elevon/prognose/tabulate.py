@@ -2,25 +2,105 @@
 
 from __future__ import annotations
 
+import time as clock
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted, NotActingWarning
-from elevon.prognose.exposure import exposure, recorded_signals, run_signals
-from elevon.prognose.grid import Grid
-from elevon.prognose.law import Law
+from elevon.prognose.law import LAWS, Law, laws_of
 from elevon.prognose.requirement import MEASURES, SEVERITY, Requirement, RunSignals
-from elevon.prognose.response import ResponseTables
+from elevon.prognose.response import Grid, ResponseTables, axis_points
 from elevon.progress import Progress
 from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.mission import Mission
+    from elevon.recording import Recording
     from elevon.scenario import Scenario
+
+
+_RATE = 400.0  # Hz
+_ROLES = (
+    "command",
+    "output_position",
+    "motor_speed",
+    "torque_current",
+    "temperature",
+    "surface_temperature",
+    "locked",
+)
+_NAMES = ("motor_torque", "friction_torque", "energy_friction", "energy_efficiency")
+_AGEING = LAWS["insulation"].coefficients["activation"].value  # K
+
+
+@lru_cache(maxsize=16)
+def _signals(wiring: str, fidelity: str) -> dict[str, str]:
+    """Role, or name where a signal has no role, to the signal that is recorded."""
+    from elevon import _core
+
+    there = _core.signals(wiring, fidelity)
+    out: dict[str, str] = {}
+    for role in _ROLES:
+        name = next((s["name"] for s in there if s["role"] == role), None)
+        if name is not None:
+            out[role] = name
+    return {**out, **{n: n for n in _NAMES if any(s["name"] == n for s in there)}}
+
+
+def recorded_signals(wiring: str, fidelity: str) -> str:
+    """Return the recording plan of a run."""
+    return ",".join(dict.fromkeys(_signals(wiring, fidelity).values())) + f"@{_RATE:g} Hz"
+
+
+def run_signals(recording: Recording, wiring: str, fidelity: str) -> RunSignals:
+    """Return the signals of a run by role."""
+    names = _signals(wiring, fidelity)
+    first = recording[next(iter(names.values()))]
+    return RunSignals(
+        np.asarray(first.time, dtype=np.float64),
+        {role: np.asarray(recording[name].values) for role, name in names.items()},
+        recording.status == "ok",
+    )
+
+
+def exposure(run: RunSignals, mission: Mission) -> dict[str, float]:
+    """Return the drivers of a mission, keys of `DRIVERS`, for one of its units of use."""
+    step = np.diff(run.time, append=run.time[-1])
+    speed = run["motor_speed"]
+    travel = np.abs(speed) * step
+    torque = np.abs(run["motor_torque"])
+    travelled = float(travel.sum())
+    cubic = float((torque**3 @ travel) / travelled) if travelled > 0.0 else 0.0
+    winding = run["temperature"]
+    out = {
+        "hours": float(mission.hours),
+        "friction_work": mission.repeats * _friction_work(run, step),
+        "shaft_travel": mission.repeats * travelled,
+        "torque_cubic_mean": float(np.cbrt(cubic)),
+        "winding_temperature": _ageing_mean(winding),
+    }
+    surface = run.signals.get("surface_temperature", winding)
+    return {**out, "surface_temperature": float(surface.mean())}
+
+
+def _friction_work(run: RunSignals, step: Floats) -> float:
+    if "friction_torque" in run.signals:
+        return float(np.abs(run["friction_torque"] * run["motor_speed"]) @ step)
+    parts = [run[name] for name in ("energy_friction", "energy_efficiency") if name in run.signals]
+    return float(sum(part[-1] - part[0] for part in parts))
+
+
+def _ageing_mean(kelvin: Floats) -> float:
+    """Temperature at which insulation ages as it does over the course given."""
+    return float(-_AGEING / np.log(np.mean(np.exp(-_AGEING / np.maximum(kelvin, 1.0)))))
+
 
 _CHUNK = 128  # runs held in memory at once
 _LOADS = (
@@ -260,3 +340,150 @@ def _runs(
             yield [run_signals(next(results), actuator.wiring, fidelity) for _ in point]
         if progress is not None and progress((first + len(block)) / len(work)) is False:
             raise Interrupted("interrupted while the tables were made")
+
+
+_POINTS = 5  # severities of each axis
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What the switching model gives over the reduced-order one, along each axis from the origin.
+
+    Between axes the ratios multiply: they are near one, so that what two faults do to a ratio
+    together is small of second order.
+
+    Attributes
+    ----------
+    axes : tuple of ndarray
+        Points of each axis; the load's holds its stated value 1 in the middle.
+    drivers : mapping of str to tuple of ndarray
+        Ratios of the exposure along each axis.
+    values : tuple of ndarray, shape (points, m)
+        Ratios of what requirements measure, along each axis.
+    runs : int
+        Runs of the switching model behind it.
+    """
+
+    axes: tuple[Floats, ...]
+    drivers: Mapping[str, tuple[Floats, ...]]
+    values: tuple[Floats, ...]
+    runs: int
+
+    def of(self, low: ResponseTables) -> ResponseTables:
+        """Return low-fidelity tables of the same axes, corrected."""
+        points = np.array(list(low.grid.points()))
+        drivers = {
+            name: low.drivers[name] * self._ratio([r[:, None] for r in ratios], points)[:, 0]
+            for name, ratios in self.drivers.items()
+        }
+        return replace(
+            low,
+            drivers=drivers,
+            values=low.values * self._ratio(self.values, points),
+            runs=low.runs + self.runs,
+            fidelity="low, corrected by high",
+        )
+
+    def _ratio(self, tables: Sequence[Floats], points: Floats) -> Floats:
+        """Return the product of the ratios along the axes, shape (n, m)."""
+        origin = tables[0][0]
+        out: Floats = np.ones((len(points), tables[0].shape[1])) * origin
+        for axis, table, at in zip(self.axes, tables, points.T, strict=True):
+            along = np.column_stack([np.interp(at, axis, column) for column in table.T])
+            out *= along / origin
+        return out
+
+
+def correction(
+    actuator: Actuator,
+    mission: Mission,
+    low: ResponseTables,
+    progress: Progress | None = None,
+) -> Correction:
+    """Run a few points of each axis of the switching model; compare with the `low` tables.
+
+    Points: nothing, and four of each axis up to its greatest severity.
+    """
+    axes = severity_grid(low.laws, mission, _POINTS).axes
+    origin = tuple(1.0 if k == len(low.laws) else 0.0 for k in range(len(axes)))
+    points = [origin]
+    for k, axis in enumerate(axes):
+        points += [(*origin[:k], float(v), *origin[k + 1 :]) for v in axis if float(v) != origin[k]]
+    high = tabulate(actuator, mission, low.laws, low.grid, points=points, fidelity="high",
+                     progress=progress)  # fmt: skip
+    at = list(np.array(points).T)
+
+    def ratio(table: Floats, other: Floats) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out = other / low.grid.interpolate(table, at).T
+        return np.where(np.isfinite(out), out, 1.0)
+
+    def along(table: Floats) -> tuple[Floats, ...]:
+        rows = dict(zip(points, table, strict=True))
+        return tuple(
+            np.array([rows[(*origin[:k], float(v), *origin[k + 1 :])] for v in axis])
+            for k, axis in enumerate(axes)
+        )
+
+    drivers = {
+        name: tuple(r[:, 0] for r in along(ratio(low.drivers[name][:, None],
+                                                 high.drivers[name][:, None])))
+        for name in low.drivers
+    }  # fmt: skip
+    return Correction(axes, drivers, along(ratio(low.values, high.values)), high.runs)
+
+
+def respond(
+    actuator: Actuator,
+    mission: Mission,
+    *,
+    laws: Sequence[Law] | None = None,
+    fidelity: str = "low",
+    snapshots: bool = False,
+    progress: Progress | None = None,
+) -> ResponseTables:
+    """Run the mission and the requirements over a grid of severities.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        The healthy unit.
+    mission : Mission
+        What is done and must hold.
+    laws : sequence of Law, optional
+        Those that act; default: the mission's.
+    fidelity : str
+        Of the runs.
+    snapshots : bool
+        Correct the reduced-order tables by runs of the switching model, see `correction`.
+
+    Raises
+    ------
+    InputError
+        A fault the actuator has not, a requirement it cannot be judged by, a mission it cannot do.
+    """
+    begin = clock.perf_counter()
+    acting = tuple(mission.laws() if laws is None else laws)
+    _check_laws(actuator, acting)
+    grid = severity_grid(acting, mission, axis_points(len(acting)))
+    made = tabulate(actuator, mission, acting, grid, fidelity=fidelity, progress=progress)
+    if snapshots and fidelity != "high":
+        made = correction(actuator, mission, made, progress).of(made)
+    return replace(made, seconds=clock.perf_counter() - begin)
+
+
+def _check_laws(actuator: Actuator, laws: Sequence[Law]) -> None:
+    """Refuse a law whose fault the actuator has not, or has in another unit; name those it has."""
+    from elevon.faults import catalogue
+
+    records = catalogue(actuator.wiring)
+    there = {f"{r.kind}@{place}": r.unit for r in records for place in r.places}
+    for law in laws:
+        unit = there.get(law.key)
+        if unit == law.unit:
+            continue
+        why = (
+            f"has no {law.key}" if unit is None else f"has its {law.key} in {unit}, not {law.unit}"
+        )
+        fit = ", ".join(laws_of(actuator.wiring))
+        raise InputError(f"law {law.name}: {actuator.name} {why}; laws that fit it: {fit}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.prognose.figures import severity_unit
+from elevon.prognose.page import severity_unit
 from elevon.report.figures import COLOURS, new_figure
 from elevon.units import to_display
 

@@ -14,7 +14,7 @@ from elevon.demo.life.mechanism import mechanism, motion
 from elevon.demo.life.unit import FACTORS
 from elevon.demo.page import closed, times_section
 from elevon.logs.read import read_drive_logs
-from elevon.prognose.figures import severity_unit
+from elevon.prognose.page import severity_unit
 from elevon.report import Report, ReportTable
 from elevon.units import to_display
 

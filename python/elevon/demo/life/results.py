@@ -12,7 +12,7 @@ from elevon.calibrate.outcome import Calibration
 from elevon.demo.steps import Story
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.prognose import Inspection, Prognosis, ResponseTables
-from elevon.prognose.life import Life
+from elevon.prognose.future import Life
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
 from elevon.report.checks import Check
 

@@ -29,7 +29,7 @@ from elevon.demo.steps import Work
 from elevon.errors import Interrupted, OutputExistsError
 from elevon.logs.log import Log
 from elevon.prognose import GrowthFilter, Process, Prognosis, respond
-from elevon.prognose.life import Life
+from elevon.prognose.future import Life
 from elevon.progress import Progress, part
 
 _PAGES = (

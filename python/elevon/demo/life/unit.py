@@ -15,8 +15,8 @@ from elevon.arrays import Floats
 from elevon.bench.hidden import hidden_actuator
 from elevon.faults import Fault
 from elevon.prognose import Mission, Process, respond
+from elevon.prognose.future import Life, run_to_failure
 from elevon.prognose.law import Law
-from elevon.prognose.life import Life, run_to_failure
 from elevon.progress import Progress
 
 INSPECTED = 330.0
