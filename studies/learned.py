@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from elevon.diagnose.learning.answer import diagnose_by_classes
 from elevon.diagnose.learning.classes import HEALTHY
-from elevon.diagnose.learning.classify import LabelledLog, learned_classes
+from elevon.diagnose.learning.classify import LabelledLog, learned_classes, share_interval
 from elevon.diagnose.learning.motion import motion_of
-from elevon.diagnose.modelfree.scores import share_interval
 from elevon.errors import ElevonWarning, InputError
 from elevon.progress import Progress
 from elevon.report import Check, verdict

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.diagnose.engine.spread import needed
 from elevon.diagnose.learning.archive import read_archive, write_archive
+from elevon.diagnose.learning.discriminant import Discriminant
 from elevon.diagnose.learning.motion import LoggedMotion
 from elevon.diagnose.learning.trees import Trees
-from elevon.diagnose.modelfree.discriminant import Discriminant
 from elevon.errors import FormatError, InputError
 
 KIND = "classes"

@@ -11,10 +11,9 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.learning.classes import HEALTHY, LearnedClasses, faulty_logit, scores_of
+from elevon.diagnose.learning.discriminant import SHRINKAGES, Discriminant
 from elevon.diagnose.learning.motion import motions
 from elevon.diagnose.learning.trees import Trees
-from elevon.diagnose.modelfree.discriminant import SHRINKAGES, Discriminant
-from elevon.diagnose.modelfree.scores import share_interval
 from elevon.errors import InputError, Interrupted
 from elevon.progress import Progress
 
@@ -192,3 +191,14 @@ def _judged(left: _Left, labels: Strings) -> Mapping[str, Any]:
         "healthy": int(healthy.sum()), "false_alarms": int((answer[healthy] != HEALTHY).sum()),
         "faulty": int((~healthy).sum()), "missed": int((answer[~healthy] == HEALTHY).sum()),
     }  # fmt: skip
+
+
+def share_interval(hits: int, count: int) -> tuple[float, float]:
+    """Return the exact 95 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
+    from scipy.special import betaincinv
+
+    if count == 0:
+        return 0.0, 1.0
+    low = float(betaincinv(hits, count - hits + 1, 0.025)) if hits else 0.0
+    high = float(betaincinv(hits + 1, count - hits, 0.975)) if hits < count else 1.0
+    return low, high

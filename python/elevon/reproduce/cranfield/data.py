@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.modelfree import FeatureTable, feature_table
 from elevon.errors import ElevonError, InputError, Interrupted
 from elevon.logs.formats.cranfield import DATA_DOI, read_cranfield
 from elevon.progress import Progress
 from elevon.recording import Recording
+from elevon.reproduce.cranfield.features import FeatureTable, feature_table
 
 CONDITIONS = (
     "normal", "backlash1", "backlash2", "lackLubrication1", "lackLubrication2",

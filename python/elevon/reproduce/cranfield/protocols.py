@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.modelfree import Discriminant
-from elevon.diagnose.modelfree.model import SHRINKAGE
+from elevon.diagnose.learning.discriminant import Discriminant
 from elevon.reproduce.cranfield.data import CranfieldData
 
 Groups = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
+SHRINKAGE = {"transfer": 0.2, "full": 0.6}
+"""Many features of few recordings need a scatter close to its diagonal."""
 
 
 @dataclass(frozen=True, slots=True)

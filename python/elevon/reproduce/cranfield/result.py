@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.modelfree import FULL, TRANSFER
-from elevon.diagnose.modelfree.features import FRICTION, MARKER
-from elevon.diagnose.modelfree.scores import (
-    accuracy,
-    confusion,
-    macro_f1,
-    resamples,
-    share_interval,
-)
+from elevon.diagnose.learning.classify import share_interval
 from elevon.progress import Progress
 from elevon.report import Check, all_passed
 from elevon.reproduce.cranfield.data import (
@@ -28,6 +20,7 @@ from elevon.reproduce.cranfield.data import (
     read_folder,
 )
 from elevon.reproduce.cranfield.detection import Detection, detect
+from elevon.reproduce.cranfield.features import FRICTION, FULL, MARKER, TRANSFER
 from elevon.reproduce.cranfield.protocols import (
     Answers,
     chronological,
@@ -293,3 +286,61 @@ def _quantiles(values: npt.NDArray[np.float64]) -> tuple[float, float]:
 
 def _families(words: Words) -> Words:
     return np.array([family(str(word)) for word in words])
+
+
+def macro_f1(truth: npt.ArrayLike, predicted: npt.ArrayLike) -> float:
+    """Return the mean of F1 = 2 TP / (2 TP + FP + FN) over the classes that `truth` holds.
+
+    Parameters
+    ----------
+    truth, predicted : array of int or str
+        Of each recording.
+    """
+    right, answer = np.asarray(truth), np.asarray(predicted)
+    scores = []
+    for name in np.unique(right):
+        of, called = right == name, answer == name
+        scores.append(2.0 * np.count_nonzero(of & called) / (of.sum() + called.sum()))
+    return float(np.mean(scores))
+
+
+def accuracy(truth: npt.ArrayLike, predicted: npt.ArrayLike) -> float:
+    """Return the share of recordings that are right."""
+    return float(np.mean(np.asarray(truth) == np.asarray(predicted)))
+
+
+def confusion(
+    truth: npt.ArrayLike, predicted: npt.ArrayLike, classes: Sequence[str]
+) -> list[list[int]]:
+    """Count recordings: a row for each true class, a column for each answer."""
+    right, answer = np.asarray(truth), np.asarray(predicted)
+    return [[int(((right == a) & (answer == b)).sum()) for b in classes] for a in classes]
+
+
+def resamples(
+    strata: npt.ArrayLike, *, draws: int = 1000, seed: int = 0
+) -> Iterator[npt.NDArray[np.int64]]:
+    """Draw recordings again with replacement, within each stratum (Efron's bootstrap).
+
+    Parameters
+    ----------
+    strata : array
+        Such as the number of each condition and load; how many they have stays as it is.
+    draws : int
+        How often.
+    seed : int
+        Of the draws.
+
+    Yields
+    ------
+    array of int
+        Indices of the recordings of one draw.
+    """
+    keys = np.unique(np.asarray(strata), return_inverse=True)[1]
+    order = np.argsort(keys, kind="stable")
+    counts = np.bincount(keys)
+    first = np.repeat(np.concatenate(([0], np.cumsum(counts)[:-1])), counts)
+    size = np.repeat(counts, counts)
+    random = np.random.default_rng(seed)
+    for _ in range(draws):
+        yield order[first + (random.random(len(order)) * size).astype(np.int64)]
