@@ -92,7 +92,7 @@ def compare(
     seed, start, cutoff, progress
         As `elevon.compare.compare`.
     """
-    from elevon.compare_loads import compare_loads
+    from elevon.compare import compare_loads
 
     model = as_actuator(actuator)
     moved = None if scenario is None else as_scenario(scenario, model)

@@ -115,8 +115,7 @@ def test_the_default_table_leaves_out_what_changes_nothing():
 
 
 def test_every_shipped_actuator_says_what_it_is_compared_on():
-    from elevon.compare import compared_signals, default_scenario, default_start
-    from elevon.compare_loads import load_size
+    from elevon.compare import compared_signals, default_scenario, default_start, load_size
     from elevon.parameters.find import set_names
 
     for name in set_names():
@@ -143,7 +142,7 @@ def test_a_set_of_ones_own_is_compared_on_its_own_scenario():
 
 
 def test_the_load_opposes_and_aids_motion_of_either_direction():
-    from elevon.compare_loads import compare_loads
+    from elevon.compare import compare_loads
 
     actuator = elevon.Actuator.load("torino-rotary")
     results = compare_loads(actuator, elevon.Scenario.from_dict(SHORT), load="60 N m", start=1.0)

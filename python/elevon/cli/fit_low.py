@@ -15,7 +15,7 @@ from elevon.errors import InputError
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.lowfit import FitCase, LowFit
+    from elevon.calibrate.low_fit import FitCase, LowFit
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -32,8 +32,8 @@ def fit_low(
     force: bool = False,
 ) -> Answer:
     """Fit the reduced-order model's free numbers to the switching model over scenarios, faults."""
-    from elevon.lowfit import fit_low as run
-    from elevon.lowfit import write_fit
+    from elevon.calibrate.low_fit import fit_low as run
+    from elevon.calibrate.low_fit import write_fit
     from elevon.reproduce.lowfit_page import lowfit_report
 
     common.check_outputs([out], force=force)
@@ -48,7 +48,7 @@ def fit_low(
 
 
 def _cases(model: Actuator, files: list[Path] | None, faults: list[str] | None) -> list[FitCase]:
-    from elevon.lowfit import default_cases, named_cases
+    from elevon.calibrate.low_fit import default_cases, named_cases
     from elevon.scenario import Scenario
 
     if not files:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from elevon.lowfit import LowFit
+from elevon.calibrate.low_fit import LowFit
 from elevon.report import Report, ReportTable
 from elevon.reproduce.provenance import provenance
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import elevon
+from elevon.calibrate.low_fit import FitCase, fit_low, named_cases
 from elevon.cli import main
 from elevon.errors import InputError
-from elevon.lowfit import FitCase, fit_low, named_cases
 
 MOVING = {
     "duration": "6 s",

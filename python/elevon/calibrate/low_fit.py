@@ -1,10 +1,12 @@
-"""Least squares of the reduced-order model's own numbers against runs of the switching model."""
+"""The reduced-order model's own numbers, fitted to runs of the switching model."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -14,11 +16,15 @@ from elevon.actuator import Actuator
 from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, compared_rate, filtered
 from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
-from elevon.lowfit.cases import FitCase
+from elevon.faults import Fault
+from elevon.parameters import Parameter
+from elevon.parameters.find import base_reference
 from elevon.parameters.records import records
+from elevon.parameters.write import write_set
 from elevon.plain import WORKING, Plain, key
 from elevon.progress import Progress, part
 from elevon.recording import Recording
+from elevon.scenario import Scenario
 
 Array = npt.NDArray[np.float64]
 
@@ -100,6 +106,110 @@ class LowFit(Plain):
     def rms_after(self) -> dict[str, float]:
         """The same with the fitted numbers."""
         return _total([case.after for case in self.cases])
+
+
+ROTARY_FAULTS = (
+    "short@motor.phase_a=0.1",
+    "eccentricity_static@motor=0.2",
+    "demagnetisation@motor=0.1",
+    "friction@transmission=0.25",
+)
+"""Faults that change the current the load takes, each at the size a diagnosis has to see."""
+
+
+@dataclass(frozen=True, slots=True)
+class FitCase:
+    """One comparison: a name for people and what both models run.
+
+    Attributes
+    ----------
+    name : str
+        Scenario and fault in words.
+    scenario : Scenario
+        Its faults included.
+    """
+
+    name: str
+    scenario: Scenario
+
+
+def default_cases(actuator: Actuator) -> list[FitCase]:
+    """Return the cases of an actuator when none are given.
+
+    A rotary actuator: one cycle of the loaded campaign's motion (faster, under 0.5 and 1.5 N m of
+    brake), healthy under both loads and with each of four faults under the larger one, and a
+    steady speed that two low supplies cannot give, under both loads. Any other: its own scenario.
+
+    Raises
+    ------
+    InputError
+        The actuator has no scenario of its own.
+    """
+    if actuator.wiring == "rotary":
+        return _rotary()
+    if actuator.default_scenario is None:
+        raise InputError(
+            f"fit-low: {actuator.name} has no scenario of its own; give some with --scenario"
+        )
+    default = Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
+    return [FitCase("its own scenario", default)]
+
+
+def named_cases(scenarios: Sequence[tuple[str, Scenario]], faults: Sequence[str]) -> list[FitCase]:
+    """Return every scenario healthy and with each of the faults alone.
+
+    Parameters
+    ----------
+    scenarios : sequence of (str, Scenario)
+        Name and scenario.
+    faults : sequence of str
+        In the grammar of the command line.
+
+    Raises
+    ------
+    InputError
+        A fault that cannot be read.
+    """
+    parsed = [Fault.parse(text) for text in faults]
+    cases = []
+    for name, scenario in scenarios:
+        cases.append(FitCase(f"{name}, as given", scenario))
+        cases += [FitCase(f"{name}, {fault}", scenario.with_faults([fault])) for fault in parsed]
+    return cases
+
+
+def _rotary() -> list[FitCase]:
+    light, heavy = (_motion(brake) for brake in ("0.5 N m", "1.5 N m"))
+    loaded = named_cases([("1.5 N m of brake", heavy)], ROTARY_FAULTS)
+    starved = [
+        FitCase(f"{volts:g} V, {brake:g} N m of brake", _starved(volts, brake))
+        for volts in (45.0, 55.0)
+        for brake in (0.5, 1.5)
+    ]
+    return [FitCase("0.5 N m of brake, as given", light), *loaded, *starved]
+
+
+def _motion(brake: str) -> Scenario:
+    sine = {"kind": "sine", "amplitude": "30 deg", "bias": "30 deg", "frequency": "0.1 Hz"}
+    return Scenario.from_dict(
+        {
+            "duration": "15 s",
+            "command": {"mode": "position", "terms": [sine]},
+            "load": {"brake": {"terms": [{"kind": "constant", "value": brake}]}},
+        }
+    )
+
+
+def _starved(volts: float, brake: float) -> Scenario:
+    """A steady speed that the supply cannot give: what is reached tells the voltage ratio."""
+    return Scenario.from_dict(
+        {
+            "duration": "10 s",
+            "command": {"mode": "speed", "terms": [{"kind": "constant", "value": "500 rpm"}]},
+            "load": {"brake": {"terms": [{"kind": "constant", "value": f"{brake} N m"}]}},
+            "supply": {"terms": [{"kind": "constant", "value": f"{volts} V"}]},
+        }
+    )
 
 
 def fit_low(
@@ -306,3 +416,33 @@ def _size(name: str, values: Array) -> float:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def fitted_parameters(fit: LowFit) -> list[Parameter]:
+    """Return one entry for each fitted number: source, old value, deviation over the cases."""
+    names = "; ".join(case.name for case in fit.cases)
+    entries = []
+    for path, old, new, spread in fit.fitted:
+        note = f"For drive.kind = {fit.drive}. Standard deviation over the cases {spread:.2g}."
+        source = f"fitted to the switching model over {len(fit.cases)} cases: {names}"
+        rounded = float(f"{new:.4g}")
+        entries.append(Parameter(path, rounded, "", source, note, "calibrated", old))
+    return entries
+
+
+def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False) -> Path:
+    """Write the fitted numbers as an actuator file; errors as `elevon.files.write_text`."""
+    target = Path(path).expanduser()
+    return write_set(
+        target,
+        name=_name(target.stem),
+        changes=fitted_parameters(fit),
+        base=base_reference(fit.before.path, fit.before.name, target),
+        title=f"{fit.before.title or fit.before.name}, reduced-order model fitted",
+        force=force,
+    )
+
+
+def _name(stem: str) -> str:
+    plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
+    return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
