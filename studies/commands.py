@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elevon.progress import Progress
-    from elevon.report import Report
+    from elevon.report import Report, provenance
     from studies.fault_limits.limits import FaultLimits
 
 __all__ = ["app", "fault_limits", "fault_limits_page", "independent"]
@@ -126,7 +126,6 @@ def fault_limits_page(
 ) -> Report:
     """Return the report of the limits, with the command of these numbers."""
     from elevon.report import Report, ReportTable
-    from elevon.reproduce.provenance import provenance
 
     report = Report(
         "Detection limits",

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,11 @@ from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.results import Result
 from elevon.scenario import Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from elevon.report import Report
 
 Array = npt.NDArray[np.float64]
 
@@ -431,3 +436,60 @@ def _loaded(scenario: Scenario, times: Any, values: Any) -> Scenario:
     load = dict(data.get("load", {}))
     terms = list(load.get("output", {}).get("terms", []))
     return scenario.replaced(load={**load, "output": {"terms": [*terms, term]}})
+
+
+_SHOWN_NAMES = {
+    "position": "Output position",
+    "speed": "Motor speed",
+    "q_current": "Torque current",
+}
+_SHOWN_UNITS = {"rad": ("deg", 180.0 / np.pi), "m": ("mm", 1e3), "rad/s": ("rpm", 30.0 / np.pi)}
+
+
+def compare_report(comparison: Comparison, actuator: str, *, date: str | None = None) -> Report:
+    """Return the page of a comparison; `actuator` is named as on the command line."""
+    from elevon.report import Report, ReportTable, provenance
+
+    values = comparison.to_dict()
+    report = Report(
+        f"High and low fidelity of {values['actuator']}",
+        f"Both models on one scenario, after {comparison.start:g} s, through one filter: "
+        f"{values['filter']}.",
+        date=date,
+    )
+    error, speed_up = "RMS error over RMS", f"{comparison.speed_up:.0f}"
+    report.fact("Position", f"{100 * comparison.position_nrmse:.3f} %", "RMS error over amplitude")
+    report.fact("Speed", f"{100 * comparison.speed_nrmse:.2f} %", error)
+    report.fact("Torque current", f"{100 * comparison.q_current_nrmse:.2f} %", error)
+    real_time = f"low at {values['low_realtime_factor']:.0f} times real time"
+    report.fact("Speed-up", speed_up, real_time)
+    section = report.section("Side by side")
+    for figure, caption in comparison_figures(comparison):
+        section.figure(figure, caption)
+    numbers = [item for item in values.items() if isinstance(item[1], float)]
+    report.section("Numbers").table(ReportTable(["Quantity", "Value"], numbers))
+    made = {"Parameter hash": values["parameter_hash"], "Seed": values["seed"]}
+    faults = ", ".join(values["faults"]) or "none"
+    report.provenance(provenance(f"elevon compare {actuator} --out DIR", **made, Faults=faults))
+    return report
+
+
+def comparison_figures(comparison: Comparison) -> Iterator[tuple[Figure, str]]:
+    """Yield a figure of each compared signal, both models and their difference, and its caption."""
+    from elevon.report.figures import COLOURS, new_figure
+
+    units = {"position": comparison.unit, "speed": "rad/s", "q_current": "A"}
+    time = comparison.time
+    for part_name, signal in comparison.signals.items():
+        unit, scale = _SHOWN_UNITS.get(units[part_name], (units[part_name], 1.0))
+        high, low = scale * comparison.high[signal], scale * comparison.low[signal]
+        label = f"{_SHOWN_NAMES[part_name]} [{unit}]"
+        with new_figure(2, height=3.8, sharex=True, height_ratios=[3, 1]) as (figure, axes):
+            both, difference = axes
+            both.plot(time, high, color=COLOURS["blue"], lw=2.2, label="high")
+            both.plot(time, low, "--", color=COLOURS["orange"], lw=1.4, label="low")
+            both.set_ylabel(label)
+            both.legend(loc="upper right", ncols=2)
+            difference.plot(time, low - high, color=COLOURS["grey"], lw=1.0)
+            difference.set(xlabel="Time [s]", ylabel="low - high")
+        yield figure, f"{label}, high and low, and their difference."

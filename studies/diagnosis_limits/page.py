@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.report import Report, ReportTable
+from elevon.report import Report, ReportTable, provenance
 from elevon.report.figures import COLOURS, new_figure
-from elevon.reproduce.provenance import provenance
 from studies.diagnosis_limits.logs import TESTS
 from studies.diagnosis_limits.plan import FAULTS
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from elevon.report import Report, ReportTable
-from elevon.reproduce.provenance import provenance
+from elevon.report import Report, ReportTable, provenance
 from studies.independent.result import IndependentResult
 
 COLUMNS = ("what", "hits", "logs", "share", "interval")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from elevon.prognose.metrics import metrics_figure
-from elevon.report import Report, ReportTable
-from elevon.reproduce.provenance import provenance
+from elevon.report import Report, ReportTable, provenance
 from studies.prognosis.result import SHARES, PrognosisResult
 
 __all__ = ["prognosis_report"]

@@ -25,7 +25,7 @@ ROWS = [
     ["logs"],
     ["simulate"],
     ["experiment", "compare"],
-    ["bench", "campaign", "calibrate", "session", "deploy"],
+    ["fault_sensitivity", "bench", "campaign", "calibrate", "session", "deploy"],
     ["analysis", "benchmark", "response", "environment"],
     ["diagnose"],
     ["nexttest", "training", "doctor"],

@@ -97,8 +97,8 @@ def test_default_scenario_keeps_the_promised_limits():
 
 
 def test_every_line_of_the_catalogue_is_in_the_default_table():
+    from elevon.fault_sensitivity import ROTARY_FAULTS
     from elevon.faults import Fault, catalogue, find_record
-    from elevon.reproduce.fault_sensitivity import ROTARY_FAULTS
 
     faults = [Fault.parse(text) for text in ROTARY_FAULTS]
     records = [find_record(fault.kind, fault.place, "rotary") for fault in faults]
@@ -108,7 +108,7 @@ def test_every_line_of_the_catalogue_is_in_the_default_table():
 
 
 def test_the_default_table_leaves_out_what_changes_nothing():
-    from elevon.reproduce.fault_sensitivity import ROTARY_FAULTS, _default
+    from elevon.fault_sensitivity import ROTARY_FAULTS, _default
 
     chosen = _default(elevon.Actuator.load("torino-rotary"), None)
     assert set(ROTARY_FAULTS) - set(chosen) == {"connector_open@supply=1"}

@@ -18,7 +18,6 @@ from elevon.reproduce.pisa_failures import (
     failure_checks,
     judge,
     reproduce_failures,
-    severities,
 )
 from elevon.reproduce.pisa_failures_page import summary
 from elevon.reproduce.pisa_gear import ACTUATOR
@@ -68,9 +67,9 @@ def test_severities_follow_the_record() -> None:
     """A share whole, any other range half, a range with both signs from both sides."""
     wiring = elevon.Actuator.load(ACTUATOR).wiring
     records = {record.kind: record for record in catalogue(wiring)}
-    assert severities(records["hall_high"]) == (1.0,)
-    assert severities(records["jam"]) == (50e3,)
-    assert severities(records["offset"]) == (0.25, -0.25)
+    assert records["hall_high"].tried == (1.0,)
+    assert records["jam"].tried == (50e3,)
+    assert records["offset"].tried == (0.25, -0.25)
 
 
 @pytest.mark.long
@@ -84,7 +83,7 @@ def test_every_fault_in_every_phase(fidelity: str) -> None:
     assert len(unsafe) == len(LISTED)
     assert all(row.sensors for row in unsafe)
     records = catalogue(elevon.Actuator.load(ACTUATOR).wiring)
-    carried = sum(len(r.places) * len(severities(r)) for r in records if fidelity in r.fidelities)
+    carried = sum(len(r.places) * len(r.tried) for r in records if fidelity in r.fidelities)
     assert len(result.rows) == carried * len(PHASES)
     if fidelity == "low":
         assert matrix(result) in PAGE.read_text(encoding="utf-8")

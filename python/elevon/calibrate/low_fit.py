@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,9 @@ from elevon.plain import WORKING, Plain, key
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.scenario import Scenario
+
+if TYPE_CHECKING:
+    from elevon.report import Report
 
 Array = npt.NDArray[np.float64]
 
@@ -446,3 +449,32 @@ def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False)
 def _name(stem: str) -> str:
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
     return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
+
+
+def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Report:
+    """Return the page of a fit; `actuator` is named as on the command line."""
+    from elevon.report import Report, ReportTable, provenance
+
+    values = fit.to_dict()
+    report = Report(
+        f"Reduced-order model of {values['actuator']} fitted",
+        "The reduced-order model's own numbers, by least squares of filtered position, speed and q "
+        f"current against the switching model with drive.kind = {values['drive']}.",
+        date=date,
+    )
+    for row in values["fitted"]:
+        report.fact(row["path"], f"{row['new']:.4g}", f"was {row['old']:.4g}")
+    fitted = [[row["path"], row["old"], row["new"], row["deviation"]] for row in values["fitted"]]
+    section = report.section("Numbers")
+    section.table(ReportTable(["Number", "Old", "New", "Deviation over the cases"], fitted))
+    for row in values["kept"]:
+        section.text(f"{row['path']} is kept: {row['reason']}.")
+    names = list(values["rms_before"])
+    head = [f"{n.replace('_', ' ')} {when} [%]" for n in names for when in ("before", "after")]
+    rows = [
+        [case["name"], *(100 * case[when][n] for n in names for when in ("before", "after"))]
+        for case in values["cases"]
+    ]
+    report.section("Cases").table(ReportTable(["Case", *head], rows))
+    report.provenance(provenance(f"elevon fit-low {actuator} --report FILE", Hash=fit.before.hash))
+    return report

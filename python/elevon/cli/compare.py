@@ -59,7 +59,7 @@ def compare(
         )  # fmt: skip
     values = result.to_dict(stored=False)
     if page is not None:
-        from elevon.reproduce.compare_page import compare_report
+        from elevon.compare import compare_report
 
         say(f"report: {compare_report(result, actuator, date=date).save(page, force=force)}")
     return Answer(values, lambda: _print(result.headline, values))
@@ -84,7 +84,7 @@ def _print(headline: str, values: dict[str, Any]) -> None:
 
 
 def _faults_table(model: Actuator, run_scenario: Scenario, after: float, seed: int) -> Answer:
-    from elevon.reproduce.fault_sensitivity import fault_sensitivity
+    from elevon.fault_sensitivity import fault_sensitivity
 
     with progress_bar("healthy and faulty runs") as advance:
         rows = fault_sensitivity(model, run_scenario, start=after, seed=seed, progress=advance)

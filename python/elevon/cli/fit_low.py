@@ -33,8 +33,7 @@ def fit_low(
 ) -> Answer:
     """Fit the reduced-order model's free numbers to the switching model over scenarios, faults."""
     from elevon.calibrate.low_fit import fit_low as run
-    from elevon.calibrate.low_fit import write_fit
-    from elevon.reproduce.lowfit_page import lowfit_report
+    from elevon.calibrate.low_fit import lowfit_report, write_fit
 
     common.check_outputs([out], force=force)
     model = common.read_actuator(actuator, settings)

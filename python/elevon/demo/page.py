@@ -11,10 +11,9 @@ from elevon.calibrate.zeros import encoder_count
 from elevon.demo.bench_figure import bench_figure
 from elevon.demo.page_parameters import parameters_section
 from elevon.estimate import LEVEL
-from elevon.report import Report, ReportTable
+from elevon.report import Report, ReportTable, provenance
 from elevon.report.figures import COLOURS, new_figure
 from elevon.reproduce.backlash.page import summary_figure
-from elevon.reproduce.provenance import provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

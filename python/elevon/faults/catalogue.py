@@ -43,6 +43,16 @@ class FaultRecord:
         """The range of the severity, such as ``[0, 0.95]``."""
         return _interval(self.minimum, self.maximum, self.minimum_open)
 
+    @property
+    def tried(self) -> tuple[float, ...]:
+        """Severities with which a campaign tries the fault: half the range, with both its signs.
+
+        A share from 0 to 1 is tried whole.
+        """
+        top = self.maximum
+        chosen = top if self.unit == "1" and top == 1.0 else 0.5 * top
+        return (chosen, -chosen) if self.minimum < 0.0 else (chosen,)
+
     def read_severity(self, given: float | str, place: str) -> float:
         """Return the severity in SI, or raise when it is outside the range."""
         value = parse_quantity(given, self.unit or "1", place)

@@ -7,6 +7,6 @@
 """
 
 from elevon.report.checks import Check, all_passed, verdict
-from elevon.report.document import Report, ReportTable, Section
+from elevon.report.document import Report, ReportTable, Section, provenance
 
-__all__ = ["Check", "Report", "ReportTable", "Section", "all_passed", "verdict"]
+__all__ = ["Check", "Report", "ReportTable", "Section", "all_passed", "provenance", "verdict"]

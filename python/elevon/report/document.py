@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -305,6 +306,26 @@ class Report:
         """
         self.beside = _pages_beside(Path(path).expanduser()) if links else {}
         return write_text(path, self.html(), force=force)
+
+
+def provenance(command: str, **more: object) -> dict[str, object]:
+    """Return what a page says of its making: versions, the command that makes it again.
+
+    Parameters
+    ----------
+    command : str
+        Command line that makes the page again.
+    **more
+        What else is stated, such as the seed.
+    """
+    import elevon
+
+    try:
+        version = elevon.__version__
+    except ImportError:
+        version = "source tree without the compiled core"
+    python = ".".join(str(number) for number in sys.version_info[:3])
+    return {"Elevon": version, "Python": python, "Made again by": command, **more}
 
 
 _MARK = '<meta name="generator" content="Elevon">'

@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from elevon.report import Report, ReportTable
+from elevon.report import Report, ReportTable, provenance
 from elevon.reproduce.catalogue import PublishedWork, works
-from elevon.reproduce.provenance import provenance
 
 if TYPE_CHECKING:
     from elevon.reproduce.everything import EveryCase, IndexRow

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.compare import Comparison, compare, default_scenario, filtered
+from elevon.compare import Comparison, compare, comparison_figures, default_scenario, filtered
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.report import Check
@@ -151,3 +151,8 @@ def _row(name: str, comparison: Comparison, floor: float | None) -> CaseRow:
         values["q_current_rms_error_a"],
         floor,
     )
+
+
+def page_values(_result: object) -> dict[str, object]:
+    """Return what the page of the three cases has beside its result."""
+    return {"figures": comparison_figures}

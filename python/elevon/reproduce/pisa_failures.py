@@ -173,19 +173,9 @@ def _cases(actuator: Actuator, fidelity: str, faults: Sequence[str] | None) -> I
         if fidelity not in record.fidelities or (faults is not None and record.kind not in faults):
             continue
         for place in record.places:
-            for severity in severities(record):
+            for severity in record.tried:
                 for phase in PHASES:
                     yield _Case(record, place, severity, phase)
-
-
-def severities(record: FaultRecord) -> tuple[float, ...]:
-    """Return what is tried of a kind: all of it where it is a share, else half its range.
-
-    A range with both signs is tried with both.
-    """
-    top = record.maximum
-    chosen = top if record.unit == "1" and top == 1.0 else 0.5 * top
-    return (chosen, -chosen) if record.minimum < 0.0 else (chosen,)
 
 
 def _scenario(case: _Case) -> Any:

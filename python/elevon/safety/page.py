@@ -12,10 +12,9 @@ from elevon.actuator import Actuator
 from elevon.data import packaged_toml
 from elevon.recording import Recording
 from elevon.recording.states import code_names
-from elevon.report import Report
+from elevon.report import Report, provenance
 from elevon.report.described import described
 from elevon.report.figures import new_figure
-from elevon.reproduce.provenance import provenance
 from elevon.safety.campaign import HazardRow, SafetyResult, per_hour
 from elevon.safety.hazards import HAZARDS, RECORD
 

@@ -181,7 +181,6 @@ def _course(spans: Sequence[tuple[float, float]]) -> dict[str, Any]:
 def failures(wiring: str, fidelity: str) -> tuple[Failure, ...]:
     """Return every fault of the catalogue at every place, with both signs where it has them."""
     from elevon.faults.catalogue import catalogue
-    from elevon.reproduce.pisa_failures import severities
 
     return tuple(
         Failure(
@@ -192,7 +191,7 @@ def failures(wiring: str, fidelity: str) -> tuple[Failure, ...]:
         for record in catalogue(wiring)
         if fidelity in record.fidelities
         for place in record.places
-        for severity in severities(record)
+        for severity in record.tried
     )  # fmt: skip
 
 
