@@ -92,7 +92,7 @@ lint: setup stubs ## formatting, style and types of both languages
 	cargo fmt --all --check
 	cargo clippy --locked --release --workspace --all-targets --quiet -- -D warnings
 
-size: $(STAMPS)/packages ## code lines of the Python package, and public signatures with Any
+size: $(STAMPS)/packages ## lines of Python code wherever it stands, modules, classes, share of imports, signatures with Any
 	$(BIN)/python tools/size.py
 
 stubs: $(STAMPS)/extension ## the hand-written stub against the built extension
