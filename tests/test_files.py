@@ -67,7 +67,7 @@ def test_a_failing_writer_leaves_the_old_file(tmp_path):
 
 
 def test_what_a_killed_writer_left_is_not_read_as_a_file_of_its_folder(tmp_path, monkeypatch):
-    from elevon.parameters.find import VARIABLE, set_names
+    from elevon.parameters.load import VARIABLE, set_names
     from elevon.prognose.history import read_history
     from elevon.report import Report
 

@@ -17,10 +17,10 @@ from elevon.units import (
     parse_quantity,
     parse_unit,
     si_unit,
-    table,
     to_display,
     to_si,
 )
+from elevon.units.unit import KINDS, PREFIXES, SYMBOLS, WORDS
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ _DIMENSIONS = ("[length]", "[mass]", "[time]", "[current]", "[temperature]", "[a
 
 @pytest.mark.parametrize(
     "name",
-    [*table.SYMBOLS, *(f"{prefix}m" for prefix in table.PREFIXES), *table.WORDS, "kohm", "MPa"],
+    [*SYMBOLS, *(f"{prefix}m" for prefix in PREFIXES), *WORDS, "kohm", "MPa"],
 )
 def test_the_table_agrees_with_another(name):
     ours, registry = parse_unit(name), _pint()
@@ -207,9 +207,9 @@ def test_a_prefix_stands_before_si_symbols_only(text):
 
 
 def test_every_kind_reads_and_no_two_kinds_are_the_same():
-    dimensions = [parse_unit(example).dimension for _, example in table.KINDS]
+    dimensions = [parse_unit(example).dimension for _, example in KINDS]
     assert len(set(dimensions)) == len(dimensions)
-    for name, example in table.KINDS:
+    for name, example in KINDS:
         assert kind_name(example) == name
         assert parse_unit(example).factor == 1.0
 

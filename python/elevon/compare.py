@@ -178,7 +178,7 @@ def default_scenario(actuator: Actuator) -> Scenario:
 
 
 def _shipped(wiring: str) -> Mapping[str, Any] | None:
-    from elevon.parameters.find import set_names
+    from elevon.parameters.load import set_names
 
     sets = (Actuator.load(name) for name in set_names())
     tables = (item.compare for item in sets if item.wiring == wiring)

@@ -23,7 +23,7 @@ from elevon.response import (
     linearise,
     loop_response,
 )
-from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
+from elevon.simulate.prepare import ActuatorLike, ScenarioLike, as_actuator, as_scenario
 
 
 def bench(

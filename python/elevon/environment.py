@@ -11,7 +11,7 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.errors import DivergedError, InputError
 from elevon.session import Session, SessionState
-from elevon.simulate.arguments import ActuatorLike
+from elevon.simulate.prepare import ActuatorLike
 from elevon.units import parse_quantity
 
 

@@ -247,7 +247,7 @@ def _default(actuator: Actuator, faults: Sequence[str] | None) -> Sequence[str]:
         return faults
     if actuator.wiring != "rotary":
         raise InputError(f"faults: name them; there is no default list for {actuator.wiring!r}")
-    from elevon.simulate.own_faults import own_faults
+    from elevon.simulate.acting import own_faults
 
     # One that changes nothing in this actuator is refused as a run.
     acting = {(record.kind, place) for record in own_faults(actuator) for place in record.places}

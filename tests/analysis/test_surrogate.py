@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from elevon import InputError
-from elevon.analysis.kriging import CoKriging, Kriging
-from elevon.analysis.pairs import Pairs, Samples
-from elevon.analysis.surrogate import study
+from elevon.analysis.response import Pairs, Samples
+from elevon.analysis.surrogate import CoKriging, Kriging, study
 
 
 def _high(x):

@@ -14,7 +14,7 @@ from elevon.bench.stand import stand_names, stand_of, stands
 from elevon.bench.steps import ForceStep
 from elevon.documents import Document, validated
 from elevon.errors import InputError
-from elevon.parameters.find import set_names
+from elevon.parameters.load import set_names
 
 LOOP = ForceLoop(limit=50e3, omega=2 * np.pi * 20.0, damping=0.7, friction=150.0, mass=120.0)
 TIME = np.arange(0.0, 4.0, 1e-3)

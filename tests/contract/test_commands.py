@@ -10,7 +10,7 @@ import pytest
 
 from elevon import Actuator, Recording
 from elevon.cli import main
-from elevon.parameters.find import set_names
+from elevon.parameters.load import set_names
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 SECONDS = 9.0

@@ -108,7 +108,7 @@ def test_an_import_of_elevon_that_lacks_an_extra_says_so_in_python_too(monkeypat
     """A package that no finder knows; somebody else's import and a mere question are not ours."""
     monkeypatch.setitem(EXTRAS, "files", (*EXTRAS["files"], "no_such_package"))
     with pytest.raises(ModuleNotFoundError, match=r"elevon\[files\], which is not installed: pip"):
-        exec("import no_such_package", {"__name__": "elevon.recording.convert"})
+        exec("import no_such_package", {"__name__": "elevon.recording.recording"})
     with pytest.raises(ModuleNotFoundError, match="No module named"):
         exec("import no_such_package", {"__name__": "pandas.io"})
     question = "import importlib.util as u; found = u.find_spec('no_such_package')"

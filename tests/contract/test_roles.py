@@ -3,8 +3,8 @@
 import pytest
 
 from elevon import _core
-from elevon.features.roles import ROLES as FEATURE_ROLES
-from elevon.features.roles import players
+from elevon.features.records import ROLES as FEATURE_ROLES
+from elevon.features.records import players
 from elevon.units import parse_unit
 
 WIRINGS = [(w["name"], fidelity) for w in _core.wirings() for fidelity in w["fidelities"]]

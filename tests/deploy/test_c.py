@@ -11,7 +11,7 @@ import pytest
 
 import elevon
 from elevon.deploy import run_document
-from elevon.deploy.binary import library
+from elevon.deploy.fmu import library
 from tests.deploy.driver import CRun
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,8 +11,7 @@ from elevon.errors import DamageError, InputError, VersionError
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log, bridged, per_log
 from elevon.logs.read import read_log, read_logs
-from elevon.recording.channel import Channel
-from elevon.recording.clock import Clock
+from elevon.recording.channel import Channel, Clock
 
 ROLES = {
     "speed_ref": "speed_ref",

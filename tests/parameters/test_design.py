@@ -8,8 +8,7 @@ from elevon import Actuator, simulate
 from elevon.errors import InputError, RangeError, UnitError, UnknownNameError
 from elevon.parameters import records
 from elevon.parameters.design import quantities
-from elevon.parameters.design.formula import evaluate
-from elevon.parameters.design.rule import TERMS, rules
+from elevon.parameters.design.rule import TERMS, evaluate, rules
 
 MINE = {"supply": "28 V", "power": "50 W", "lead": "2 mm", "gear": 4, "encoder": 1024}
 JOINT = {"supply": "48 V", "torque": "49 N m", "speed": "25 rpm", "gear": 100}

@@ -5,7 +5,7 @@ import pytest
 
 import elevon
 from elevon.cli import main
-from elevon.recording.overview import bands, overview, spectra
+from elevon.recording.plot import bands, overview, spectrum_panels
 from tests.recording.make import ordinary
 
 SCENARIO = {
@@ -76,7 +76,7 @@ def test_a_spectrum_shows_a_sine_at_its_height():
     time = np.arange(4000) / 1000
     values = {"command": 0 * time, "output_position": 0.01 * np.sin(2 * np.pi * 50 * time)}
     recording = elevon.Recording.build(time, values, {"command": "rad", "output_position": "rad"})
-    (spectrum,) = spectra(overview(recording))
+    (spectrum,) = spectrum_panels(overview(recording))
     line = next(iter(spectrum.lines.values()))
     assert spectrum.time[np.argmax(line)] == pytest.approx(50.0, abs=0.3)
     assert line.max() == pytest.approx(np.rad2deg(0.01), rel=0.02)

@@ -116,7 +116,7 @@ def test_the_default_table_leaves_out_what_changes_nothing():
 
 def test_every_shipped_actuator_says_what_it_is_compared_on():
     from elevon.compare import compared_signals, default_scenario, default_start, load_size
-    from elevon.parameters.find import set_names
+    from elevon.parameters.load import set_names
 
     for name in set_names():
         actuator = elevon.Actuator.load(name)

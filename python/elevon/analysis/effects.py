@@ -2,19 +2,143 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.analysis.response import CampaignResponse
-from elevon.analysis.terms import TermColumn, blocks_matrix, further_contrasts, separate
 from elevon.arrays import Floats
+from elevon.data import packaged_toml
 from elevon.errors import InputError
 from elevon.plain import STORED, Plain
 from elevon.report import Report
+from elevon.report.described import described
+from elevon.report.figures import COLOURS, new_figure
 from elevon.results import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+#: Columns whose correlation differs from 0 or 1 by less than this are not, or wholly, aliased.
+_EQUAL = 1e-9
+
+
+@dataclass
+class TermColumn:
+    """One term of the model.
+
+    Attributes
+    ----------
+    factors : tuple of int
+        One, or two of an interaction.
+    values : ndarray, shape (runs,)
+        Coded -1 to +1.
+    aliases : list
+        Terms that have the same column, each with its sign.
+    """
+
+    factors: tuple[int, ...]
+    values: Floats
+    aliases: list[tuple[tuple[int, ...], float]] = field(default_factory=list)
+
+
+def blocks_matrix(block: npt.NDArray[np.int64]) -> Floats:
+    """Return the mean and the blocks as orthonormal columns."""
+    indicators = (block[:, None] == np.unique(block)[None, :]).astype(np.float64)
+    matrix: Floats = indicators / np.sqrt(indicators.sum(axis=0))
+    return matrix
+
+
+def separate(
+    coded: Sequence[Floats], head: Floats
+) -> tuple[list[TermColumn], list[tuple[int, ...]], list[tuple[int, ...]]]:
+    """Return the terms that can be estimated together.
+
+    Parameters
+    ----------
+    coded : sequence of ndarray, shape (runs,)
+        The factors.
+    head : ndarray, shape (runs, blocks)
+        Orthonormal: the mean and the blocks.
+
+    Returns
+    -------
+    terms : list of Column
+        Each with the terms it is aliased with.
+    blocked : list of tuple
+        Terms that are confounded with the blocks.
+    partial : list of tuple
+        Interactions that are left out: partly aliased with terms, too many to estimate together.
+    """
+    names = [(k,) for k in range(len(coded))]
+    pairs = list(itertools.combinations(range(len(coded)), 2))
+    terms: list[TermColumn] = []
+    blocked: list[tuple[int, ...]] = []
+    partial: list[tuple[int, ...]] = []
+    for name in [*names, *pairs]:
+        values = np.prod([coded[k] for k in name], axis=0)
+        residual = values - head @ (head.T @ values)
+        if np.linalg.norm(residual) < 1e-6 * np.linalg.norm(values):
+            blocked.append(name)
+        elif (same := _same(residual, terms, head)) is not None:
+            same[0].aliases.append((name, same[1]))
+        else:
+            terms.append(TermColumn(name, values))
+    whole = np.column_stack([head, *(term.values for term in terms)])
+    if np.linalg.matrix_rank(whole) < whole.shape[1]:
+        partial = [term.factors for term in terms if len(term.factors) > 1]
+        terms = [term for term in terms if len(term.factors) == 1]
+    return terms, blocked, partial
+
+
+def _same(
+    residual: Floats, terms: Sequence[TermColumn], head: Floats
+) -> tuple[TermColumn, float] | None:
+    for term in terms:
+        other = term.values - head @ (head.T @ term.values)
+        cosine = float(residual @ other / (np.linalg.norm(residual) * np.linalg.norm(other)))
+        if abs(abs(cosine) - 1.0) < _EQUAL:
+            return term, float(np.sign(cosine))
+    return None
+
+
+def further_contrasts(fitted: Floats, coded: Sequence[Floats]) -> list[Floats]:
+    """Return contrasts that the model leaves: interactions of more factors, then any others.
+
+    Parameters
+    ----------
+    fitted : ndarray, shape (runs, p)
+        The model: mean, blocks, terms.
+    coded : sequence of ndarray, shape (runs,)
+        The factors.
+
+    Returns
+    -------
+    list of ndarray, shape (runs,)
+        Orthogonal to the model and to each other, of length sqrt(runs).
+    """
+    basis, _ = np.linalg.qr(fitted)
+    further: list[Floats] = []
+    orders = range(3, len(coded) + 1)
+    words = itertools.chain.from_iterable(
+        itertools.combinations(range(len(coded)), order) for order in orders
+    )
+    columns = (np.prod([coded[k] for k in word], axis=0) for word in words)
+    unit = iter(np.eye(len(fitted)))
+    for values in itertools.chain(columns, unit):
+        if basis.shape[1] == len(fitted):
+            break
+        residual = values - basis @ (basis.T @ values)
+        residual -= basis @ (basis.T @ residual)
+        if (length := np.linalg.norm(residual)) > 1e-6 * np.linalg.norm(values):
+            basis = np.column_stack([basis, residual / length])
+            further.append(residual / length * np.sqrt(len(fitted)))
+    return further
 
 
 @dataclass(frozen=True)
@@ -100,8 +224,6 @@ class Effects(Result):
 
     def report(self, *, date: str | None = None) -> Report:
         """Return its page."""
-        from elevon.analysis.effects_page import effects_report
-
         return effects_report(self, self.folder, date=date)
 
 
@@ -294,3 +416,58 @@ def _about(factor: Any) -> dict[str, Any]:
         "low": factor.levels[0],
         "high": factor.levels[-1],
     }
+
+
+EQUAL_REPEATS = (
+    "the repeats of each point are equal: nothing random was simulated (sensor noise, spread of "
+    "units); they count as one run"
+)
+_METHODS = {
+    "replicates": "Student's t with the pure error of repeated points",
+    "lenth": "Lenth's pseudo standard error: the design is not replicated",
+    "residual": "Student's t with the residual of the model, which holds what the model lacks",
+    "none": "none: the design leaves nothing to judge the effects by",
+}
+
+
+def effects_report(effects: Effects, folder: str, *, date: str | None = None) -> Report:
+    """Return the report of a campaign's effects on a response."""
+    names = {"effects": effects, "methods": _METHODS, "equal_repeats": EQUAL_REPEATS,
+             "pareto": pareto, "half_normal": half_normal}  # fmt: skip
+    report = described(packaged_toml("elevon.analysis", "effects.toml"), names, date=date)
+    report.provenance(
+        {"Command": f"elevon campaign effects {folder} --response {effects.response}"}
+    )
+    return report
+
+
+def pareto(effects: Effects, most: int = 25) -> Figure:
+    """Return the Pareto chart of the largest effects."""
+    terms = effects.terms[:most][::-1]
+    colours = [COLOURS["blue" if term.significant else "grey"] for term in terms]
+    sizes = [abs(term.effect) for term in terms]
+    with new_figure(height=0.8 + 0.26 * len(terms)) as (figure, axes):
+        axes.barh([term.term for term in terms], sizes, color=colours)
+        if effects.margin is not None:
+            axes.axvline(effects.margin, color=COLOURS["red"], linestyle="--")
+        axes.set_xlabel(f"magnitude of the effect on {effects.response} [{effects.unit}]")
+    return figure
+
+
+def half_normal(effects: Effects) -> Figure:
+    """Return the half-normal plot."""
+    from scipy.stats import norm
+
+    terms = sorted(effects.terms, key=lambda term: abs(term.effect))
+    quantiles = norm.ppf(0.5 + 0.5 * (np.arange(len(terms)) + 0.5) / len(terms))
+    sizes = [abs(term.effect) for term in terms]
+    with new_figure(height=4.2) as (figure, axes):
+        axes.plot(sizes, quantiles, "o", color=COLOURS["blue"], markersize=4)
+        for term, size, quantile in list(zip(terms, sizes, quantiles, strict=True))[-8:]:
+            axes.annotate(term.term, (size, quantile), xytext=(4, 2), textcoords="offset points")
+        if effects.error is not None:
+            top = float(quantiles[-1])
+            axes.plot([0.0, effects.error * top], [0.0, top], color=COLOURS["red"], linestyle="--")
+        axes.set_xlabel(f"magnitude of the effect on {effects.response} [{effects.unit}]")
+        axes.set_ylabel("half-normal quantile")
+    return figure

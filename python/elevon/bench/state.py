@@ -8,7 +8,7 @@ from pathlib import Path
 from elevon.bench.traces import trace_files
 from elevon.errors import FormatError, InputError, OutputExistsError
 from elevon.files import check_output
-from elevon.recording.description import description_path
+from elevon.recording.csv import description_path
 from elevon.worklog import Item, WorkLog
 
 

@@ -19,7 +19,7 @@ from elevon.calibrate.validation import Validation
 from elevon.calibrate.ways import CalibrationRequest, ValidationRequest, way_of
 from elevon.logs.read import LogsLike, as_logs
 from elevon.progress import Progress
-from elevon.simulate.arguments import ActuatorLike, as_actuator
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 
 def calibrate(

@@ -18,7 +18,7 @@ from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
 from elevon.faults import Fault
 from elevon.parameters import Parameter
-from elevon.parameters.find import base_reference
+from elevon.parameters.load import base_reference
 from elevon.parameters.records import records
 from elevon.parameters.write import write_set
 from elevon.plain import WORKING, Plain, key

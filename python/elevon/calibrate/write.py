@@ -12,7 +12,7 @@ from elevon.data import packaged_toml
 from elevon.estimate import LEVEL
 from elevon.files import write_text
 from elevon.parameters import Parameter
-from elevon.parameters.find import base_reference
+from elevon.parameters.load import base_reference
 from elevon.parameters.records import record_of
 from elevon.parameters.write import updated_set
 

@@ -14,7 +14,7 @@ from elevon.campaign.resolved_file import read_resolved
 from elevon.campaign.runs_table import RUNS
 from elevon.campaign.store import Manifest, read_manifest, repair_hint, work_log
 from elevon.errors import FormatError, InputError, unknown
-from elevon.recording.old import warn_of_old_names
+from elevon.recording.contents import warn_of_old_names
 from elevon.retired import current
 from elevon.transaction import located
 from elevon.worklog import Item

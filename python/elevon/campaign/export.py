@@ -13,8 +13,8 @@ from elevon.campaign.dataset import Dataset
 from elevon.errors import InputError, Interrupted
 from elevon.files import atomic_path, check_output
 from elevon.recording import Channel, Recording
+from elevon.recording.channel import LONGEST_NAME
 from elevon.recording.formats import check_ending, files_of
-from elevon.recording.names import LONGEST_NAME
 from elevon.report.cells import quoted_columns
 
 _ITEM = re.compile(r"(\d+)(?:-(\d+))?")

@@ -23,7 +23,7 @@ from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
 from elevon.faults import Fault
 from elevon.scenario import Scenario
-from elevon.scenario.bare import check_units, with_texts
+from elevon.scenario.scenario import check_units, with_texts
 
 Quantity = tuple[Target, str, Any]
 

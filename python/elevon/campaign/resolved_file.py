@@ -26,7 +26,7 @@ from elevon.campaign.store import (
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular
 from elevon.parameters import ParameterSet
-from elevon.parameters.parameter import Parameter
+from elevon.parameters.set import Parameter
 from elevon.plain import fields_of
 from elevon.retired import current, mapped
 from elevon.transaction import located

@@ -41,7 +41,7 @@ def chosen(record: Acting, fidelity: str | None, not_modelled: bool) -> bool:
 
 def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, object]:
     """Drives under which a fault of an actuator acts, and where it rests with the reasons."""
-    from elevon.simulate.own_faults import drive_kinds, resting
+    from elevon.simulate.acting import drive_kinds, resting
 
     neutral = resting(actuator, record)
     drives = drive_kinds(actuator)

@@ -34,7 +34,7 @@ def effects(
 
 
 def _print_effects(effects: Effects) -> None:
-    from elevon.analysis.effects_page import EQUAL_REPEATS
+    from elevon.analysis.effects import EQUAL_REPEATS
 
     rows = [
         [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)]
@@ -72,8 +72,7 @@ def surrogate(
 
     With --low: kriging of the high runs against co-kriging of both fidelities at equal cost.
     """
-    from elevon.analysis.pairs import pair, samples_of
-    from elevon.analysis.response import read_response
+    from elevon.analysis.response import pair, read_response, samples_of
     from elevon.analysis.surrogate import study
     from elevon.campaign import load_campaign
 

@@ -98,7 +98,7 @@ def _own_scenarios(file: Path) -> list[str]:
     """Return what is wrong with the units of the scenarios that a set brings."""
     from elevon.documents import Document, read_toml
     from elevon.errors import InputError
-    from elevon.scenario.bare import check_units
+    from elevon.scenario.scenario import check_units
 
     document = read_toml(file)
     compare = document.data.get("compare")

@@ -76,7 +76,7 @@ def read_scenario(
 ) -> Scenario:
     """Read a scenario file, or the actuator's own, and apply ``--duration`` and ``--fault``."""
     from elevon.cli.fault_options import read_faults
-    from elevon.simulate.arguments import as_scenario
+    from elevon.simulate.prepare import as_scenario
 
     scenario = as_scenario(path, actuator)
     if duration is not None:

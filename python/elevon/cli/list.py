@@ -20,7 +20,7 @@ app = group("List what there is, with units and sources.")
 def actuators() -> Answer:
     """List the actuators that can be named: the shipped ones and those in ELEVON_ACTUATORS."""
     from elevon.documents import read_toml
-    from elevon.parameters.find import set_paths
+    from elevon.parameters.load import set_paths
 
     rows = []
     for name, path in sorted(set_paths().items()):
@@ -137,7 +137,7 @@ def _faults(
     from elevon.actuator import Actuator
     from elevon.faults import catalogue
     from elevon.parameters.records import wiring_names
-    from elevon.simulate.own_faults import own_faults
+    from elevon.simulate.acting import own_faults
 
     if reference is None:
         names = wiring_names()

@@ -63,7 +63,7 @@ def new(
 def _variant(path: Path, base: str, *, force: bool) -> Answer:
     from elevon.actuator import Actuator
     from elevon.files import write_text
-    from elevon.parameters.variant import variant_text
+    from elevon.parameters.write import variant_text
 
     text = variant_text(path.stem, Actuator.load(base), base)
     written = write_text(path, text, force=force)

@@ -12,9 +12,9 @@ from elevon.errors import InputError
 from elevon.files import check_output, write_text
 from elevon.parameters import load_set
 from elevon.parameters.design import Given, derive, quantities
-from elevon.parameters.design.quantities import read_number
+from elevon.parameters.design.derive import read_number
 from elevon.parameters.design.write import design_text
-from elevon.parameters.find import base_reference, find_set
+from elevon.parameters.load import base_reference, find_set
 from elevon.plain import fields_of
 
 _WIRING = {"--linear": "ballscrew", "--rotary": "rotary"}

@@ -141,7 +141,7 @@ def _print_result(recording: Any, wiring: str) -> None:
         f"{meta['sim_s']:g} s simulated in {meta['wall_s']:.3g} s "
         f"({speed:.3g} times real time, {meta['ns_per_step']:.3g} ns a step)\n"
     )
-    from elevon.recording.states import code_names
+    from elevon.recording.plot import code_names
 
     events = _events(recording, wiring).get("events")
     if events is not None:

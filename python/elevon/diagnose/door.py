@@ -18,7 +18,7 @@ from elevon.diagnose.monitor.answer import Monitoring
 from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor
 from elevon.errors import InputError, unknown
 from elevon.logs.read import as_logs
-from elevon.simulate.arguments import as_actuator
+from elevon.simulate.prepare import as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from elevon.diagnose.surrogate import Surrogate
     from elevon.logs.log import Log
     from elevon.logs.read import LogsLike
-    from elevon.simulate.arguments import ActuatorLike
+    from elevon.simulate.prepare import ActuatorLike
 
 METHODS = ("model", "surrogate", "both", "learned")
 

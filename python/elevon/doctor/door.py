@@ -19,11 +19,11 @@ from elevon.logs.maps.column_map import ColumnMap, find_map
 from elevon.logs.maps.guess_write import guess_text
 from elevon.logs.read import named_apart
 from elevon.progress import Progress, part
-from elevon.simulate.arguments import as_actuator
+from elevon.simulate.prepare import as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.simulate.arguments import ActuatorLike
+    from elevon.simulate.prepare import ActuatorLike
 
 T = TypeVar("T")
 PathLike = str | os.PathLike[str]

@@ -9,8 +9,7 @@ from typing import Any
 
 from elevon.errors import InputError
 from elevon.faults.catalogue import find_record
-from elevon.faults.grammar import pairs
-from elevon.faults.profile import Profile
+from elevon.faults.profile import Profile, pairs
 from elevon.seam import CoreFault
 
 Value = float | str

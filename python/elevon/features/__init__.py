@@ -1,9 +1,7 @@
 """Features of a motion: computed while it is simulated, or from any log, by the same code."""
 
-from elevon.features.log import LogFeatures, recording_features
-from elevon.features.plan import FeaturePlan, feature_plans
-from elevon.features.records import FeatureRecord, feature_records
-from elevon.features.roles import ROLES, assign_roles, comparable
+from elevon.features.plan import FeaturePlan, LogFeatures, feature_plans, recording_features
+from elevon.features.records import ROLES, FeatureRecord, assign_roles, comparable, feature_records
 
 __all__ = [
     "ROLES",

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.errors import RangeError
-from elevon.scenario.compile import port_units
-from elevon.scenario.evaluate import evaluate_terms
+from elevon.scenario.compile import evaluate_terms, port_units
 from elevon.units import format_quantity
 
 if TYPE_CHECKING:

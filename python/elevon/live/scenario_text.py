@@ -12,8 +12,7 @@ from elevon.documents import Document, validated
 from elevon.faults import Fault
 from elevon.faults.catalogue import find_record
 from elevon.scenario import Terms
-from elevon.scenario.compile import port_units
-from elevon.scenario.evaluate import evaluate_terms
+from elevon.scenario.compile import evaluate_terms, port_units
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:

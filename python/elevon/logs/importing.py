@@ -26,8 +26,7 @@ from elevon.logs.maps.column_map import ColumnMap, find_map, shipped_map
 from elevon.logs.maps.columns import looks_like_drive
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
-from elevon.recording.csv import joined_tables
-from elevon.recording.description import describes, description_path
+from elevon.recording.csv import describes, description_path, joined_tables
 from elevon.scenario import Scenario
 
 _ROUNDING = 0.6  # ms: a clock written in whole ms jitters by half of one

@@ -11,12 +11,12 @@ from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.engine.candidates import candidates_of
 from elevon.nexttest.belief import read_result
 from elevon.nexttest.choose import next_test as choose
-from elevon.simulate.arguments import as_actuator
+from elevon.simulate.prepare import as_actuator
 
 if TYPE_CHECKING:
     from elevon.nexttest.choose import NextTest
     from elevon.progress import Progress
-    from elevon.simulate.arguments import ActuatorLike
+    from elevon.simulate.prepare import ActuatorLike
 
 
 def next_test(

@@ -22,13 +22,13 @@ from elevon.prognose.page import prognosis_page
 from elevon.prognose.predict import predict as look_ahead
 from elevon.prognose.tabulate import respond
 from elevon.progress import Progress, part
-from elevon.simulate.arguments import as_actuator
+from elevon.simulate.prepare import as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.response import ResponseTables
     from elevon.report import Report
-    from elevon.simulate.arguments import ActuatorLike
+    from elevon.simulate.prepare import ActuatorLike
 
 #: Inspections as the filters take them, or the use at each diagnosis and the diagnosis.
 _Seen = Sequence[tuple[float, Diagnosis]] | Sequence[Inspection | tuple[float, Diagnosis]]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from elevon.arrays import Floats
-from elevon.errors import DamageError, FormatError, InputError
-from elevon.recording.channel import Channel
-from elevon.recording.clock import Clock
+from elevon.errors import DamageError, FormatError, InputError, RetiredNamesWarning
+from elevon.recording.channel import Channel, Clock
 from elevon.recording.header import SCHEMA, Header
-from elevon.recording.old import with_present_names
+from elevon.retired import current, mapped
 
 
 @dataclass(frozen=True)
@@ -95,3 +96,30 @@ def rebuild(
         raise
     except (InputError, TypeError, ValueError) as error:
         raise FormatError(f"{place}: {error}") from error
+
+
+def with_present_names(contents: Contents) -> Contents:
+    """Return the contents of an old file with the present names; what is named so already stays."""
+    names = {channel.name for channel in contents.channels}
+    renamed = {n: new for n in names if (new := current(n)) != n and new not in names}
+    channels = [
+        replace(c, name=renamed.get(c.name, c.name), text=current(c.text))
+        for c in contents.channels
+    ]
+    meta, labels = mapped(contents.meta), mapped(contents.labels)
+    final = {renamed.get(name, name): value for name, value in contents.final.items()}
+    changed = sorted(renamed)
+    if not changed and (meta, labels) != (contents.meta, contents.labels):
+        changed = ["its description"]
+    return replace(contents, channels=channels, meta=meta, labels=labels, final=final, old=changed)
+
+
+def warn_of_old_names(path: str | os.PathLike[str], names: Sequence[str], stacklevel: int) -> None:
+    """Say once what of a file was written with names that were replaced."""
+    listed = ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+    warnings.warn(
+        f"{os.fspath(path)}: was written with names that have been replaced ({listed}); "
+        "it is read with the present ones",
+        RetiredNamesWarning,
+        stacklevel + 1,
+    )

@@ -12,7 +12,7 @@ from elevon.errors import FormatError, InputError, UnknownNameError, nearest, un
 from elevon.files import atomic_path, check_output
 from elevon.recording import csv
 from elevon.recording.contents import Contents
-from elevon.recording.description import description_path
+from elevon.recording.csv import description_path
 
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording

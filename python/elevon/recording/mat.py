@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 from elevon.arrays import Floats
 from elevon.containers.mat5 import Variable, variables
 from elevon.errors import FormatError, InputError
+from elevon.recording.channel import check_name
 from elevon.recording.contents import Contents, check_size, header_bytes, rebuild
 from elevon.recording.header import Header
-from elevon.recording.names import check_name
 
 if TYPE_CHECKING:
     from elevon.recording.recording import Recording

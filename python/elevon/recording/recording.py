@@ -9,9 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError, did_you_mean, unknown
-from elevon.recording.channel import Channel, in_si
-from elevon.recording.channel_set import ChannelSet
-from elevon.recording.clock import Clock
+from elevon.recording.channel import Channel, ChannelSet, Clock, in_si
 from elevon.recording.convert import to_arrow, to_pandas, to_xarray
 from elevon.recording.header import Header, plain
 
@@ -169,7 +167,7 @@ class Recording(ChannelSet):
         return f"<Recording {self.status}: {len(self)} channels on [{clocks}]>"
 
     def _repr_html_(self) -> str:
-        from elevon.recording.notebook_card import recording_card
+        from elevon.recording.plot import recording_card
 
         return recording_card(self)
 
@@ -282,7 +280,7 @@ class Recording(ChannelSet):
 
         loaded = dict(vars(load(path, max_bytes=max_bytes)))
         if old := loaded.pop("old"):
-            from elevon.recording.old import warn_of_old_names
+            from elevon.recording.contents import warn_of_old_names
 
             warn_of_old_names(path, old, 2)
         try:

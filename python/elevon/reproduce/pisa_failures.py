@@ -19,7 +19,7 @@ from elevon.faults.catalogue import FaultRecord, catalogue
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.recording.states import code_names
+from elevon.recording.plot import code_names
 from elevon.report.checks import Check, CheckedResult
 from elevon.reproduce.pisa_gear import ACTUATOR
 

@@ -11,7 +11,7 @@ from elevon.actuator import Actuator
 from elevon.plain import fields_of
 from elevon.progress import Progress
 from elevon.recording import Recording
-from elevon.recording.states import code_names
+from elevon.recording.plot import code_names
 from elevon.report.checks import Check, verdict
 from elevon.reproduce.pisa_gear import (
     ACTUATOR,

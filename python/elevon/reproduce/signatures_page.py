@@ -63,7 +63,7 @@ def _map(items: list[Signature]) -> Figure:
 
 
 def _pair(item: Signature) -> Figure:
-    from elevon.recording.overview import Panel, spectra
+    from elevon.recording.plot import Panel, spectrum_panels
 
     unit = {"motor_speed": "rpm", "motor_torque": "N m"}.get(item.signal, "A")
     scale = float(to_display(1.0, unit)) if unit == "rpm" else 1.0
@@ -78,7 +78,7 @@ def _pair(item: Signature) -> Figure:
     with new_figure(1, 2, height=2.3, width_ratios=[3, 2]) as (figure, axes):
         for name, values in lines.items():
             axes[0].plot(item.time[::step], values[::step], label=name, **looks[name])
-        for panel in spectra([Panel(item.signal, unit, item.time, lines)]):
+        for panel in spectrum_panels([Panel(item.signal, unit, item.time, lines)]):
             low = panel.time < 0.45 / (item.time[1] - item.time[0])
             for name, values in panel.lines.items():
                 slices = np.unique(np.geomspace(1, low.sum() - 1, 300).astype(int))

@@ -1,10 +1,8 @@
 """Frequency response of an actuator at work, its open loops, and linear models of it."""
 
-from elevon.response.band import AgreementBand, band_of
-from elevon.response.estimate import FrequencyResponse
+from elevon.response.estimate import AgreementBand, FrequencyResponse, band_of
 from elevon.response.linear import LinearModel, linearise
-from elevon.response.loop import LoopResponse, loop_response
-from elevon.response.margins import Margin, Margins, margins
+from elevon.response.loop import LoopResponse, Margin, Margins, loop_response, margins
 from elevon.response.measure import frequency_response
 
 __all__ = [

@@ -14,7 +14,7 @@ from elevon.errors import InputError
 from elevon.plain import STORED, in_unit, key
 from elevon.results import Result
 from elevon.session import Session
-from elevon.simulate.arguments import ActuatorLike
+from elevon.simulate.prepare import ActuatorLike
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:

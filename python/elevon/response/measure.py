@@ -16,7 +16,7 @@ from elevon.response.estimate import FrequencyResponse, estimate
 from elevon.scenario import Scenario
 from elevon.scenario.compile import signal_units
 from elevon.simulate import Run, check_fidelity, simulate_batch, solver_step
-from elevon.simulate.arguments import ActuatorLike, as_actuator
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 from elevon.units import display_unit, parse_quantity
 
 _UNITS = {"position": "", "speed": "rad/s", "torque": "N m"}  # of the command; "": the output's

@@ -11,7 +11,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.data import packaged_toml
 from elevon.recording import Recording
-from elevon.recording.states import code_names
+from elevon.recording.plot import code_names
 from elevon.report import Report, provenance
 from elevon.report.described import described
 from elevon.report.figures import new_figure

@@ -3,6 +3,6 @@
 from elevon.session.fmu import Fmu
 from elevon.session.loop import Controller, run_loop
 from elevon.session.session import Session
-from elevon.session.start import SessionState
+from elevon.session.values import SessionState
 
 __all__ = ["Controller", "Fmu", "Session", "SessionState", "run_loop"]

@@ -15,14 +15,25 @@ from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario.compile import port_units
 from elevon.session.coupling import coupled
-from elevon.session.divergence import diverged_error, diverged_runs
 from elevon.session.fmu import Fmu
-from elevon.session.inputs import SignalIndex, input_change, left_out
-from elevon.session.start import SessionState, announced, fault_places, runs_of
-from elevon.session.values import Value, one_each, text, texts, whole_steps
+from elevon.session.values import (
+    SessionState,
+    SignalIndex,
+    Value,
+    announced,
+    diverged_error,
+    diverged_runs,
+    fault_places,
+    input_change,
+    left_out,
+    one_each,
+    runs_of,
+    text,
+    texts,
+    whole_steps,
+)
 from elevon.simulate.acting import report
-from elevon.simulate.arguments import ActuatorLike, ScenarioLike
-from elevon.simulate.prepare import Prepared, Run, prepare, solver_step
+from elevon.simulate.prepare import ActuatorLike, Prepared, Run, ScenarioLike, prepare, solver_step
 from elevon.units import parse_quantity
 
 _FOREVER = 4.0e15  # solver steps: a session has no end of its own

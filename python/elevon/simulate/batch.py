@@ -13,8 +13,17 @@ from elevon.memory import check_memory
 from elevon.recording import Clock, Recording
 from elevon.seam import CoreResult
 from elevon.simulate.acting import report
-from elevon.simulate.arguments import ActuatorLike, ScenarioLike, changed
-from elevon.simulate.prepare import Features, Prepared, Record, Run, prepare, prepare_named
+from elevon.simulate.prepare import (
+    ActuatorLike,
+    Features,
+    Prepared,
+    Record,
+    Run,
+    ScenarioLike,
+    changed,
+    prepare,
+    prepare_named,
+)
 from elevon.simulate.result import build_recording
 
 Progress = Callable[[float], Any]

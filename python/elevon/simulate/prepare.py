@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.errors import InputError, unknown
+from elevon.errors import ArgumentTypeError, InputError, RangeError, unknown
+from elevon.faults import Fault
 from elevon.features import FeaturePlan, feature_plans
 from elevon.parameters import records
 from elevon.parameters.records import wirings
@@ -18,8 +20,128 @@ from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
 from elevon.scenario import Scenario, compile_scenario
 from elevon.scenario.compile import CompiledScenario, signal_units
 from elevon.simulate.acting import Notice, check_values, not_acting
-from elevon.simulate.arguments import ActuatorLike, ScenarioLike, as_actuator, as_scenario
-from elevon.simulate.stroke import check_stroke
+from elevon.waveforms import TABLE, wave_records
+
+ActuatorLike = Actuator | str | os.PathLike[str]
+ScenarioLike = Scenario | Mapping[str, Any] | str | os.PathLike[str] | None
+
+
+def as_actuator(given: ActuatorLike, place: str = "actuator") -> Actuator:
+    """Return an actuator: as given, or loaded by its name or from its file.
+
+    Raises
+    ------
+    ArgumentTypeError
+        Something else was given; the message says what is expected.
+    InputError
+        No such actuator, or a wrong file.
+    """
+    if isinstance(given, Actuator):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        return Actuator.load(given)
+    raise ArgumentTypeError(
+        f"{place}: {_kind(given)} is no actuator; expected an Actuator, a name "
+        "('torino-rotary') or the path of a TOML file"
+    )
+
+
+def changed(
+    scenario: Scenario, duration: str | float | None, faults: Sequence[Fault | str]
+) -> Scenario:
+    """Return a scenario of another duration, if any is given, and with further faults.
+
+    Raises
+    ------
+    ArgumentTypeError
+        The faults are one text, not a list of them.
+    InputError
+        A duration or a fault that cannot be.
+    """
+    if isinstance(faults, (str, Fault)):
+        raise ArgumentTypeError(f"faults: {faults!r} is one fault; expected a list: [{faults!r}]")
+    if duration is not None:
+        scenario = scenario.replaced(duration=duration)
+    return scenario.with_faults(faults) if faults else scenario
+
+
+def as_scenario(given: ScenarioLike, actuator: Actuator, place: str = "scenario") -> Scenario:
+    """Return a scenario: as given, of a mapping, from a file; None means the actuator's own.
+
+    Raises
+    ------
+    ArgumentTypeError
+        Something else was given; the message says what is expected.
+    InputError
+        The mapping or the file is wrong, or the actuator has no scenario of its own.
+    """
+    if isinstance(given, Scenario):
+        return given
+    if given is None:
+        return _default(actuator)
+    if isinstance(given, Mapping):
+        return Scenario.from_dict(given, place)
+    if isinstance(given, (str, os.PathLike)):
+        return Scenario.load(given)
+    raise ArgumentTypeError(
+        f"{place}: {_kind(given)} is no scenario; expected a Scenario, a dict of a scenario file's "
+        "form, the path of a TOML file, or None for the actuator's own"
+    )
+
+
+def _default(actuator: Actuator) -> Scenario:
+    if actuator.default_scenario is None:
+        raise InputError(
+            f"{actuator.name} has no scenario of its own; give one (command line: --scenario FILE)"
+        )
+    return Scenario.from_dict(actuator.default_scenario, f"{actuator.name}: scenario")
+
+
+def _kind(given: object) -> str:
+    name = type(given).__name__
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+def check_stroke(compiled: CompiledScenario, actuator: Actuator) -> None:
+    """Check the position command of an actuator that travels against its stroke.
+
+    Only a command of one waveform has a range that is known without running it; a sum is left to
+    the stops. A turning output may be driven into its stops on purpose: that is a test.
+
+    Raises
+    ------
+    RangeError
+        The message names the command's range and the stop.
+    """
+    terms = [term for term in compiled.inputs["command"] if term["enabled"]]
+    if compiled.command_mode != "position" or compiled.command_unit != "m" or len(terms) != 1:
+        return
+    low, high = _range(terms[0])
+    for path, value, beyond in (
+        ("stop.lower", low, low < actuator.parameters.value("stop.lower")),
+        ("stop.upper", high, high > actuator.parameters.value("stop.upper")),
+    ):
+        if beyond:
+            limit = actuator.parameters.value(path)
+            raise RangeError(
+                f"command: reaches {1e3 * value:.6g} mm, beyond {path}, {1e3 * limit:.6g} mm"
+            )
+
+
+def _range(term: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the lowest and the highest value of a waveform."""
+    kind = term["kind"]
+    values = dict(zip(wave_records()[kind].names, term["parameters"], strict=True))
+    if kind == TABLE:
+        points = [values["gain"] * float(value) for value in term["values"]]
+        return min(points), max(points)
+    if "amplitude" in values:
+        size, bias = abs(values["amplitude"]), values["bias"]
+        return bias - size, bias + size
+    # A ramp without an end has no range; its end is the solver's business.
+    levels = [values[n] for n in ("value", "initial", "final", "low", "high") if n in values]
+    return min(levels), max(levels)
+
 
 Record = str | Sequence[str] | None
 Features = str | Sequence[str] | None

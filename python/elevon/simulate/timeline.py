@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elevon.recording import Recording
-from elevon.recording.states import code_names
+from elevon.recording.plot import code_names
 
 _CODES = ("command", "command_refused", "state", "fault_code", "warning_code")
 

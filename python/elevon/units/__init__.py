@@ -2,7 +2,7 @@
 
 A unit is a product of symbols: ``kg cm2``, ``N m s/rad``, ``W/(m K)``. Exponents follow the symbol
 (``m2``, ``s-1``, ``m^2``). The symbols stand in one table
-(`elevon.units.table`); those of the SI take the prefixes p, n, u, m, k, M and G.
+(`elevon.units.unit`); those of the SI take the prefixes p, n, u, m, k, M and G.
 
 The angle counts as a dimension of its own. So Hz is never taken for rad/s, nor a stiffness in
 N m/rad for a torque in N m, which the SI alone cannot tell apart. A temperature in ``degC`` or

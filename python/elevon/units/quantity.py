@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.errors import InputError, RangeError, UnitError
-from elevon.units.table import DISPLAY, KINDS
-from elevon.units.unit import Unit, parse_unit, unit_names
+from elevon.units.unit import DISPLAY, KINDS, Unit, parse_unit, unit_names
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.,])\s*(.*?)\s*", re.S)
 _LONGEST = 100

@@ -14,7 +14,7 @@ from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.not_modelled import not_modelled
 from elevon.errors import InputError, unknown
 from elevon.faults import FaultRecord, catalogue
-from elevon.simulate.own_faults import own_faults
+from elevon.simulate.acting import own_faults
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

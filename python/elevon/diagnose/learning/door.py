@@ -14,12 +14,12 @@ from elevon.diagnose.learning.log_table import log_table, looked_up
 from elevon.diagnose.learning.spread import learned_spread
 from elevon.logs.log import Log
 from elevon.logs.read import read_logs
-from elevon.simulate.arguments import as_actuator
+from elevon.simulate.prepare import as_actuator
 
 if TYPE_CHECKING:
     from elevon.logs.read import LogsLike
     from elevon.progress import Progress
-    from elevon.simulate.arguments import ActuatorLike
+    from elevon.simulate.prepare import ActuatorLike
 
 
 def learn_spread(

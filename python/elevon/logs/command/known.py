@@ -11,7 +11,7 @@ from elevon.arrays import Floats
 from elevon.errors import InputError
 from elevon.logs.command.note import CommandNote
 from elevon.logs.command.reconstruct import CommandTrace
-from elevon.scenario.evaluate import evaluate_terms
+from elevon.scenario.compile import evaluate_terms
 
 _MOST = 2000  # samples compared, and starts tried first
 _REFINED = 4  # searches, each five times finer than the one before

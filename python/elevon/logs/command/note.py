@@ -24,8 +24,7 @@ from elevon.files import read_regular
 from elevon.logs.command.guess import FREE
 from elevon.logs.formats.limits import Limits, existing_file
 from elevon.plain import WORKING, Plain
-from elevon.scenario.bare import check_units
-from elevon.scenario.scenario import Command, Scenario
+from elevon.scenario.scenario import Command, Scenario, check_units
 from elevon.units import ambiguous, is_ambiguous, parse_quantity, si_unit
 from elevon.waveforms import wave_records
 

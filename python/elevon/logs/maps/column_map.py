@@ -12,7 +12,7 @@ from elevon.documents import read_toml, validated
 from elevon.errors import FormatError, InputError, did_you_mean, nearest
 from elevon.logs.formats.limits import existing_file
 from elevon.logs.maps.signals import known_roles, known_signals
-from elevon.recording.names import check_name
+from elevon.recording.channel import check_name
 from elevon.strict import Strict
 
 _MOST_BYTES = 1_000_000

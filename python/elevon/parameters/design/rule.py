@@ -6,15 +6,63 @@ the model. A rule that rests on a number nobody gave says so in its text (ASSUME
 
 from __future__ import annotations
 
+import ast
 import math
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
+from typing import Any, Protocol
 
 from elevon.data import packaged_toml
-from elevon.parameters.design.formula import evaluate
 from elevon.parameters.relations import copper_loss, torque_constant
+
+_OPERATIONS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
+
+
+def evaluate(formula: str, named: Callable[[str], float]) -> float:
+    """Return the value of a formula such as ``50 * lead`` or ``sqrt(power / 1000)``.
+
+    Parameters
+    ----------
+    formula : str
+        Numbers, names (with dots), ``+ - * / **``, parentheses, ``sqrt``.
+    named : callable
+        Name to its number.
+
+    Raises
+    ------
+    ValueError
+        Anything else in it.
+    """
+    return float(_value(_parsed(formula), named))
+
+
+@cache
+def _parsed(formula: str) -> ast.expr:
+    return ast.parse(formula, mode="eval").body
+
+
+def _value(node: ast.expr, named: Callable[[str], float]) -> Any:
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return number
+        case ast.Name() | ast.Attribute():
+            return named(ast.unparse(node))
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return -_value(operand, named)
+        case ast.BinOp(left=left, op=sign, right=right) if type(sign) in _OPERATIONS:
+            return _OPERATIONS[type(sign)](_value(left, named), _value(right, named))
+        case ast.Call(func=ast.Name(id="sqrt"), args=[argument]):
+            return math.sqrt(_value(argument, named))
+    raise ValueError(f"{ast.unparse(node)!r} has no place in a formula of a rule")
+
 
 ROOT3 = math.sqrt(3.0)
 MOTOR_EFFICIENCY = 0.8
@@ -145,7 +193,7 @@ class Rule:
     name : str
         Printed as the source of what it derives.
     value : str
-        Its formula, see `elevon.parameters.design.formula`.
+        Its formula, see `elevon.parameters.design.rule`.
     text : str
         The formula in words, and what is assumed.
     given : tuple of str

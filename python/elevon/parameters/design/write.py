@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from importlib.resources import files
 from string import Template
 
-from elevon.parameters.parameter import Parameter
-from elevon.parameters.variant import checked_name
+from elevon.parameters.set import Parameter
+from elevon.parameters.write import checked_name
 
 _TAIL = "# Not given, so assumed or derived; take away the # to state another value:\n"
 
