@@ -249,6 +249,13 @@ pub struct Signal {
     pub role: Option<Role>,
 }
 
+impl Signal {
+    /// The same with another text; an empty one leaves the record's.
+    pub const fn reworded(self, text: &'static str) -> Self {
+        Self { text: or(text, self.text), ..self }
+    }
+}
+
 /// What a form of a component changes in one of its records. Empty texts leave the record's.
 #[derive(Clone, Copy, Debug)]
 pub struct Relabel {

@@ -6,4 +6,7 @@ pub mod rotary;
 pub mod servo;
 mod wiring;
 
-pub use wiring::{Finding, Inputs, Machine, Overheat, Port, Setup, Severity, Signals, Tick, Watch, Wiring, HELD, MAX_CHUNKS, WATCHED};
+pub use wiring::{
+    Event, EventOf, Finding, Inputs, Machine, Observation, ObservationOf, Overheat, Port, Setup, Severity, Signals, Stretch, StretchOf,
+    Tick, Watch, Wiring, HELD, MAX_CHUNKS, WATCHED,
+};

@@ -16,6 +16,44 @@ pub const MAX_CHUNKS: usize = 4;
 /// Time over which a port that sets a parameter holds its value, s: short against any temperature's change.
 pub const HELD: f64 = 0.01;
 
+/// A stretch of steps of a block, all its chunks side by side. The types are those of a wiring: whatever shares them shares code.
+pub struct Stretch<'a, Q, M, Z, S> {
+    pub structure: &'a Q,
+    pub models: &'a [M],
+    pub inputs: &'a [Inputs<S>],
+    pub states: &'a mut [Z],
+    pub from: Steps,
+    pub count: Steps,
+}
+
+/// A tick of a chunk.
+pub struct Event<'a, Q, M, Z, S> {
+    /// What the wiring does then.
+    pub kind: u8,
+    pub structure: &'a Q,
+    pub model: &'a M,
+    pub inputs: &'a Inputs<S>,
+    pub state: &'a mut Z,
+    pub t: S,
+    /// Gaussian numbers of unit deviation, of a channel.
+    pub noise: &'a mut dyn FnMut(u64) -> S,
+}
+
+/// The signals of a chunk at an instant, into `out`: those of `selection`, others where they cost nothing.
+pub struct Observation<'a, Q, M, Z, S> {
+    pub structure: &'a Q,
+    pub model: &'a M,
+    pub inputs: &'a Inputs<S>,
+    pub state: &'a Z,
+    pub t: S,
+    pub selection: Signals,
+    pub out: &'a mut [S],
+}
+
+pub type StretchOf<'a, W, S> = Stretch<'a, <W as Wiring>::Structure, <W as Wiring>::Model<S>, <W as Wiring>::State<S>, S>;
+pub type EventOf<'a, W, S> = Event<'a, <W as Wiring>::Structure, <W as Wiring>::Model<S>, <W as Wiring>::State<S>, S>;
+pub type ObservationOf<'a, W, S> = Observation<'a, <W as Wiring>::Structure, <W as Wiring>::Model<S>, <W as Wiring>::State<S>, S>;
+
 /// Quantities that the solver watches.
 pub const WATCHED: usize = 4;
 
@@ -210,34 +248,10 @@ pub trait Wiring: Clone + Send + Sync + 'static {
     fn start<S: Scalar>(model: &Self::Model<S>, raw: &[S], initial: &[S]) -> Self::State<S>;
     /// After a fault changed parameters.
     fn refresh<S: Scalar>(_model: &Self::Model<S>, _structure: &Self::Structure, _raw: &[S], _state: &mut Self::State<S>) {}
-    fn tick<S: Scalar>(
-        kind: u8,
-        structure: &Self::Structure,
-        model: &Self::Model<S>,
-        inputs: &Inputs<S>,
-        state: &mut Self::State<S>,
-        t: S,
-        noise: &mut dyn FnMut(u64) -> S,
-    );
-    /// `count` steps from step `from`, all chunks of the block side by side.
-    fn advance<S: Scalar>(
-        structure: &Self::Structure,
-        models: &[Self::Model<S>],
-        inputs: &[Inputs<S>],
-        states: &mut [Self::State<S>],
-        from: Steps,
-        count: Steps,
-    );
-    /// Signals in the order of `signals()`: those of `selection`, others where they cost nothing.
-    fn observe<S: Scalar>(
-        structure: &Self::Structure,
-        model: &Self::Model<S>,
-        inputs: &Inputs<S>,
-        state: &Self::State<S>,
-        t: S,
-        selection: Signals,
-        out: &mut [S],
-    );
+    fn tick<S: Scalar>(event: EventOf<'_, Self, S>);
+    fn advance<S: Scalar>(stretch: StretchOf<'_, Self, S>);
+    /// Signals in the order of `signals()`.
+    fn observe<S: Scalar>(observation: ObservationOf<'_, Self, S>);
     /// Quantities whose leaving of their limit means divergence.
     fn watch<S: Scalar>(state: &Self::State<S>) -> [Watch<S>; WATCHED];
     /// The winding and whether it has passed its limit, which ends a run; none where nothing heats.

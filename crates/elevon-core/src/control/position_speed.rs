@@ -117,10 +117,37 @@ impl ControlStructure {
     }
 }
 
+/// The position loop of a cascade: a speed for the output's error, and a share of the commanded speed.
+#[derive(Clone, Copy, Debug)]
+pub struct PositionLoop<S> {
+    pub gain: S,
+    /// Command difference of one tick to speed reference.
+    feedforward: S,
+}
+
+impl<S: Scalar> PositionLoop<S> {
+    /// `ratio` is the motor's angle over the commanded coordinate, `dt` the tick.
+    pub fn derive(raw: &[S], ratio: S, dt: S) -> Self {
+        let g = |p: ControlParameter| raw[p as usize];
+        Self {
+            gain: g(ControlParameter::PositionGain) * g(ControlParameter::PositionGainScale),
+            feedforward: g(ControlParameter::SpeedFeedforward) * ratio / dt,
+        }
+    }
+
+    /// Speed that the change of the command since the last tick asks for; `before` keeps the command, NaN before the first.
+    #[inline(always)]
+    pub fn ahead(&self, before: &mut S, command: S) -> S {
+        let moved = command - *before;
+        *before = command;
+        S::select(moved.equals(moved), self.feedforward * moved, S::zero())
+    }
+}
+
 /// Constants of the controller at its tick `ts`, discretised exactly for inputs held over a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct PositionSpeed<S> {
-    position_gain: S,
+    position: PositionLoop<S>,
     speed_gain: S,
     integral_step: S,
     derivative_gain: S,
@@ -130,8 +157,6 @@ pub struct PositionSpeed<S> {
     per_torque_constant: S,
     threshold: S,
     back_step: S,
-    /// Command difference of one tick to speed reference.
-    feedforward: S,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -167,7 +192,7 @@ impl<S: Scalar> PositionSpeed<S> {
         // continuous form is its limit for short ticks, the difference of two samples that for long ones.
         let decay = S::one() - present(td) * (-(filter * dt / guarded(td))).exp();
         Self {
-            position_gain: g(P::PositionGain) * g(P::PositionGainScale),
+            position: PositionLoop::derive(raw, ratio, dt),
             speed_gain: gain,
             integral_step: present(ti) * gain / guarded(ti) * dt,
             derivative_gain: gain * td / dt * decay,
@@ -177,7 +202,6 @@ impl<S: Scalar> PositionSpeed<S> {
             per_torque_constant: S::one() / g(P::TorqueConstant),
             threshold: g(P::AntiWindupThreshold),
             back_step: g(P::AntiWindupBackCalculation) * dt,
-            feedforward: g(P::SpeedFeedforward) * ratio / dt,
         }
     }
 
@@ -190,12 +214,10 @@ impl<S: Scalar> PositionSpeed<S> {
         }
         let demanded = match structure.mode {
             Mode::Position if structure.feedforward => {
-                let moved = command - s.command;
-                s.command = command;
-                let known = moved.equals(moved);
-                self.position_gain.fma(position_error, S::select(known, self.feedforward * moved, S::zero()))
+                let ahead = self.position.ahead(&mut s.command, command);
+                self.position.gain.fma(position_error, ahead)
             }
-            Mode::Position => self.position_gain * position_error,
+            Mode::Position => self.position.gain * position_error,
             Mode::Speed => command,
             Mode::Torque => {
                 s.torque_ref = command.clamp_abs(self.torque_limit);

@@ -44,6 +44,29 @@ pub struct Place {
     pub targets: &'static [Target],
 }
 
+/// The places of a fault: `"name": "path" op, ...`, a target each. Behind `each [a b ...]` both are beginnings, which go with each
+/// of the endings.
+#[macro_export]
+macro_rules! places {
+    (each [$($end:ident)*] $name:literal: $path:literal $op:ident) => {
+        $crate::places!($(concat!($name, stringify!($end)) => concat!($path, stringify!($end)), $op);*)
+    };
+    ($($name:expr => $path:expr, $op:ident);*) => {{
+        const PLACES: &[$crate::fault::Place] =
+            &[$($crate::fault::Place { name: $name, targets: &[$crate::fault::Target { path: $path, op: $crate::fault::Op::$op }] }),*];
+        PLACES
+    }};
+    ($($name:literal: $path:literal $op:ident),* $(,)?) => { $crate::places!($($name => $path, $op);*) };
+}
+
+/// The places of a fault of a phase.
+#[macro_export]
+macro_rules! phases {
+    ($name:literal: $path:literal $op:ident) => {
+        $crate::places!(each [a b c] $name: $path $op)
+    };
+}
+
 /// A further number of a fault. It sets the parameter `path` (if any) when given; `flag` is a parameter set to
 /// zero because the attribute was given.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +77,13 @@ pub struct Attribute {
     pub path: &'static str,
     pub flag: &'static str,
     pub text: &'static str,
+}
+
+impl Attribute {
+    /// One that has to be given.
+    pub const fn new(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Self {
+        Self { name, unit, default: None, path, flag: "", text }
+    }
 }
 
 /// One line of the catalogue.

@@ -4,7 +4,7 @@ use super::batch::Monitor;
 use super::kernels::{Advance, Lift, Observe, Record, Ticking};
 use super::rows::Rows;
 use super::spec::{Clock, RunOutput, RunSpec, Status};
-use crate::actuator::{Inputs, Machine, Setup, Signals, Tick, Wiring, HELD};
+use crate::actuator::{Event, Inputs, Machine, Observation, Setup, Signals, Stretch, Tick, Wiring, HELD};
 use crate::command::{Source, SourceLanes};
 use crate::fault::FaultLanes;
 use crate::noise::Key;
@@ -245,14 +245,14 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     }
 
     fn advance(&mut self, from: Steps, count: Steps) -> bool {
-        S::vectorize(Advance::<W, S> {
+        S::vectorize(Advance::<W, S>(Stretch {
             structure: &self.structure,
             models: &self.models,
             inputs: &self.inputs,
             states: &mut self.states,
             from,
             count,
-        })
+        }))
     }
 
     /// Inputs and parameters that change at step `k`.
@@ -317,15 +317,15 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
                 let first = chunk * S::LANES;
                 let keys = &self.keys[first..];
                 let mut noise = |channel: u64| S::from_fn(|i| Key::new(keys[i].0, keys[i].1, channel).gaussian(count));
-                S::vectorize(Ticking::<W, S> {
+                S::vectorize(Ticking::<W, S>(Event {
                     kind: tick.kind,
                     structure: &self.structure,
                     model: &self.models[chunk],
                     inputs: &self.inputs[chunk],
                     state: &mut self.states[chunk],
-                    t: k as f64 * self.dt,
+                    t: S::splat(k as f64 * self.dt),
                     noise: &mut noise,
-                });
+                }));
             }
         }
     }
@@ -363,16 +363,15 @@ impl<'a, W: Wiring, S: Scalar, L: Lift<S>> Block<'a, W, S, L> {
     }
 
     pub(super) fn observe(&self, chunk: usize, k: Steps, selection: Signals, out: &mut [S]) {
-        let t = k as f64 * self.dt;
-        S::vectorize(Observe::<W, S> {
+        S::vectorize(Observe::<W, S>(Observation {
             structure: &self.structure,
             model: &self.models[chunk],
             inputs: &self.inputs[chunk],
             state: &self.states[chunk],
-            t,
+            t: S::splat(k as f64 * self.dt),
             selection,
             out,
-        });
+        }));
     }
 
     fn next_event(&self, k: Steps) -> Steps {

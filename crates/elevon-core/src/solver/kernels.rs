@@ -2,7 +2,7 @@
 
 use super::rows::Rows;
 use super::spec::{Clock, RunSpec};
-use crate::actuator::{Inputs, Signals, Wiring};
+use crate::actuator::{EventOf, ObservationOf, Stretch, StretchOf, Wiring};
 use crate::fault::FaultLanes;
 use crate::scalar::{Kernel, Scalar};
 use crate::time::Steps;
@@ -53,23 +53,17 @@ impl<S: Scalar> Lift<S> for Plain {
     }
 }
 
-pub(super) struct Advance<'a, W: Wiring, S: Scalar> {
-    pub structure: &'a W::Structure,
-    pub models: &'a [W::Model<S>],
-    pub inputs: &'a [Inputs<S>],
-    pub states: &'a mut [W::State<S>],
-    pub from: Steps,
-    pub count: Steps,
-}
+pub(super) struct Advance<'a, W: Wiring, S: Scalar>(pub StretchOf<'a, W, S>);
 
 impl<W: Wiring, S: Scalar> Kernel for Advance<'_, W, S> {
     /// Some lane has left its limits or tripped.
     type Output = bool;
     #[inline(always)]
     fn run(self) -> bool {
-        W::advance(self.structure, self.models, self.inputs, self.states, self.from, self.count);
+        let Stretch { structure, models, inputs, states, from, count } = self.0;
+        W::advance(Stretch { structure, models, inputs, states: &mut *states, from, count });
         let mut trouble = S::mask(false);
-        for state in self.states.iter() {
+        for state in states.iter() {
             trouble = trouble | S::zero().lt(W::tripped(state));
             for watch in W::watch(state) {
                 trouble = trouble | !watch.value.abs().le(S::splat(watch.limit));
@@ -79,21 +73,13 @@ impl<W: Wiring, S: Scalar> Kernel for Advance<'_, W, S> {
     }
 }
 
-pub(super) struct Observe<'a, W: Wiring, S: Scalar> {
-    pub structure: &'a W::Structure,
-    pub model: &'a W::Model<S>,
-    pub inputs: &'a Inputs<S>,
-    pub state: &'a W::State<S>,
-    pub t: f64,
-    pub selection: Signals,
-    pub out: &'a mut [S],
-}
+pub(super) struct Observe<'a, W: Wiring, S: Scalar>(pub ObservationOf<'a, W, S>);
 
 impl<W: Wiring, S: Scalar> Kernel for Observe<'_, W, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::observe(self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.selection, self.out);
+        W::observe(self.0);
     }
 }
 
@@ -126,21 +112,13 @@ impl<S: Scalar, L: Lift<S>> Kernel for Record<'_, S, L> {
     }
 }
 
-pub(super) struct Ticking<'a, W: Wiring, S: Scalar> {
-    pub kind: u8,
-    pub structure: &'a W::Structure,
-    pub model: &'a W::Model<S>,
-    pub inputs: &'a Inputs<S>,
-    pub state: &'a mut W::State<S>,
-    pub t: f64,
-    pub noise: &'a mut dyn FnMut(u64) -> S,
-}
+pub(super) struct Ticking<'a, W: Wiring, S: Scalar>(pub EventOf<'a, W, S>);
 
 impl<W: Wiring, S: Scalar> Kernel for Ticking<'_, W, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        W::tick(self.kind, self.structure, self.model, self.inputs, self.state, S::splat(self.t), self.noise);
+        W::tick(self.0);
     }
 }
 

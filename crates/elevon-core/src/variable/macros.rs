@@ -52,6 +52,20 @@ macro_rules! signals {
     };
 }
 
+/// Declares the enum and the table of signals whose records stand in the table of another enum; with a text of its own where one
+/// is given.
+#[macro_export]
+macro_rules! signals_of {
+    ($(#[$meta:meta])* $id:ident, $table:ident of $from:ident, $records:ident { $($variant:ident $(: $text:literal)?;)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(usize)]
+        pub enum $id { $($variant),* }
+        pub const $table: &[$crate::variable::Signal] =
+            &[$($records[$from::$variant as usize].reworded(concat!("" $(, $text)?))),*];
+    };
+}
+
 /// Declares the enums of parameters that are choices: their names in the order of their indices, and the enum itself.
 #[macro_export]
 macro_rules! choices {

@@ -104,18 +104,23 @@ const fn signal(name: &'static str, unit: &'static str, text: &'static str) -> S
     Signal { name, symbol: "-", unit, text, role: None }
 }
 
+const RAM_POSITION: Signal = signal("ram_position", "m", "ram position, on the nut's side of the backlash");
+const RAM_SPEED: Signal = signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash");
+const SCREW_TORQUE: Signal = signal("screw_torque", "N m", "force through the nut, referred to the motor shaft without losses");
+const EFFICIENCY: Signal = signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion");
+const EFFICIENCY_AIDING: Signal = signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion");
 const NUT: [Signal; 2] = [
     Signal { role: Some(Role::NutTemperature), ..signal("nut_temperature", "K", "temperature of the nut") },
     signal("heat_nut", "W", "friction heat that stays in the nut, mean of the network's last tick"),
 ];
 const HIGH_SPECIFIC: &[Signal] = &[
-    signal("ram_position", "m", "ram position, on the nut's side of the backlash"),
-    signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash"),
+    RAM_POSITION,
+    RAM_SPEED,
     signal("load_friction_force", "N", "friction and damping of the load side, the brake's force included"),
-    signal("screw_torque", "N m", "force through the nut, referred to the motor shaft without losses"),
+    SCREW_TORQUE,
     signal("spall_torque", "N m", "torque of balls falling into spalls, positive drives forwards"),
-    signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
-    signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
+    EFFICIENCY,
+    EFFICIENCY_AIDING,
     NUT[0],
     NUT[1],
     Signal {
@@ -124,44 +129,57 @@ const HIGH_SPECIFIC: &[Signal] = &[
     },
 ];
 const LOW_SPECIFIC: &[Signal] = &[
-    signal("ram_position", "m", "ram position, on the nut's side of the backlash"),
-    signal("ram_speed", "m/s", "ram speed, on the nut's side of the backlash"),
-    signal("screw_torque", "N m", "force through the nut, referred to the motor shaft without losses"),
-    signal("screw_efficiency", "1", "applied efficiency under a load that opposes motion"),
-    signal("screw_efficiency_aiding", "1", "applied efficiency under a load that aids motion"),
+    RAM_POSITION,
+    RAM_SPEED,
+    SCREW_TORQUE,
+    EFFICIENCY,
+    EFFICIENCY_AIDING,
     signal("circuit_current", "A", "current of the printed L-R circuit, sqrt(3/2) i_q: its I^2 R is the heat of all phases"),
     signal("circuit_voltage", "V", "voltage of the printed L-R circuit, sqrt(3/2) v_q"),
     NUT[0],
     NUT[1],
 ];
 
+/// The signals of a servo that are others where the output travels: command, position, speed, brake and encoder.
+const fn travelling([command, position, speed, brake, encoder]: [usize; 5]) -> [Relabel; 5] {
+    [
+        change(command, "", "m", "command with its noise (m at the ram, rad/s or N m by the control mode)"),
+        change(position, "", "m", "position of the load side"),
+        change(speed, "", "m/s", "speed of the load side"),
+        change(brake, "brake_force", "N", "force the brake can oppose on the load side"),
+        change(encoder, "", "m", "load position the encoder reports"),
+    ]
+}
+
+const FORCES: &[Relabel] = &[
+    change(H::OutputTorque as usize, "load_force", "N", "signed load on the load side, spring included"),
+    change(H::TransmissionTorque as usize, "joint_force", "N", "force through the joint between ram and load: what the load cell reports"),
+];
+
 pub const HIGH: &[Signal] = &extended::<{ signals::HIGH.len() + HIGH_SPECIFIC.len() }>(
-    signals::HIGH,
-    &[
-        change(H::Command as usize, "", "m", "command with its noise (m at the ram, rad/s or N m by the control mode)"),
-        change(H::OutputPosition as usize, "", "m", "position of the load side"),
-        change(H::OutputSpeed as usize, "", "m/s", "speed of the load side"),
-        change(H::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
-        change(H::OutputTorque as usize, "load_force", "N", "signed load on the load side, spring included"),
-        change(
-            H::TransmissionTorque as usize,
-            "joint_force",
-            "N",
-            "force through the joint between ram and load: what the load cell reports",
-        ),
-        change(H::EncoderPosition as usize, "", "m", "load position the encoder reports"),
-    ],
+    &extended::<{ signals::HIGH.len() }>(
+        signals::HIGH,
+        &travelling([
+            H::Command as usize,
+            H::OutputPosition as usize,
+            H::OutputSpeed as usize,
+            H::BrakeTorque as usize,
+            H::EncoderPosition as usize,
+        ]),
+        &[],
+    ),
+    FORCES,
     HIGH_SPECIFIC,
 );
 pub const LOW: &[Signal] = &extended::<{ signals::LOW.len() + LOW_SPECIFIC.len() }>(
     signals::LOW,
-    &[
-        change(L::Command as usize, "", "m", "command (m at the ram, rad/s or N m by the control mode)"),
-        change(L::OutputPosition as usize, "", "m", "position of the load side"),
-        change(L::OutputSpeed as usize, "", "m/s", "speed of the load side"),
-        change(L::BrakeTorque as usize, "brake_force", "N", "force the brake can oppose on the load side"),
-        change(L::EncoderPosition as usize, "", "m", "load position the encoder reports"),
-    ],
+    &travelling([
+        L::Command as usize,
+        L::OutputPosition as usize,
+        L::OutputSpeed as usize,
+        L::BrakeTorque as usize,
+        L::EncoderPosition as usize,
+    ]),
     LOW_SPECIFIC,
 );
 

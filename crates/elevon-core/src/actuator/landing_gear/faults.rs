@@ -1,36 +1,26 @@
 //! The fault catalogue of the landing-gear actuator.
 
 use crate::fault::rate::{BEARINGS, CONNECTOR, MECHANISM, MOTOR, POSITION_SENSOR, SWITCH};
-use crate::fault::{Attribute, FaultKind, Op, Place, Target};
+use crate::fault::{Attribute, FaultKind};
 use crate::variable::Range;
-
-macro_rules! places {
-    ($($name:literal: $path:literal $op:ident),* $(,)?) => {{
-        const PLACES: &[Place] = &[$(Place { name: $name, targets: &[Target { path: $path, op: Op::$op }] }),*];
-        PLACES
-    }};
-}
-
-const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
-    Attribute { name, unit, default: None, path, flag: "", text }
-}
+use crate::{phases, places};
 
 fn motor() -> Vec<FaultKind> {
-    const PHASE: &[Attribute] = &[attribute(
+    const PHASE: &[Attribute] = &[Attribute::new(
         "phase",
         "rad",
         "motor.eccentricity_static_phase",
         "phase angle of the narrow gap: electrical in the published law, round the stator in the periodic one",
     )];
     const PHASE_DYNAMIC: &[Attribute] =
-        &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
+        &[Attribute::new("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
     vec![
         FaultKind {
             kind: "short",
             unit: "1",
             range: Range::Between(0.0, 0.95),
             attributes: &[],
-            places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
+            places: phases!("motor.phase_": "motor.turns_" Lose),
             effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; torque falls in four of six sectors",
             source: "T2 (fault coefficients N_j)",
             rate: MOTOR,
@@ -40,7 +30,7 @@ fn motor() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("motor.phase_a": "motor.open_a" Set, "motor.phase_b": "motor.open_b" Set, "motor.phase_c": "motor.open_c" Set),
+            places: phases!("motor.phase_": "motor.open_" Set),
             effect: "1: the phase is interrupted, from its next current zero on; two sectors are left with torque",
             source: "T3 Table 1.1 (open circuit)",
             rate: MOTOR,
@@ -105,11 +95,7 @@ fn power() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!(
-                "inverter.a_high": "inverter.open_a_high" Set, "inverter.a_low": "inverter.open_a_low" Set,
-                "inverter.b_high": "inverter.open_b_high" Set, "inverter.b_low": "inverter.open_b_low" Set,
-                "inverter.c_high": "inverter.open_c_high" Set, "inverter.c_low": "inverter.open_c_low" Set,
-            ),
+            places: places!(each [a_high a_low b_high b_low c_high c_low] "inverter.": "inverter.open_" Set),
             effect: "1: the switch never closes; two of six sectors lose their torque",
             source: "T3 Table 1.1 (open circuit)",
             rate: SWITCH,
@@ -119,11 +105,7 @@ fn power() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!(
-                "inverter.a_high": "inverter.shorted_a_high" Set, "inverter.a_low": "inverter.shorted_a_low" Set,
-                "inverter.b_high": "inverter.shorted_b_high" Set, "inverter.b_low": "inverter.shorted_b_low" Set,
-                "inverter.c_high": "inverter.shorted_c_high" Set, "inverter.c_low": "inverter.shorted_c_low" Set,
-            ),
+            places: places!(each [a_high a_low b_high b_low c_high c_low] "inverter.": "inverter.shorted_" Set),
             effect: "1: the switch is always closed; the first gate of its partner shoots through and the drive trips",
             source: "T3 Table 1.1 (short)",
             rate: SWITCH,
@@ -150,7 +132,7 @@ fn sensors() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("sensor.hall_a": "hall.stuck_high_a" Set, "sensor.hall_b": "hall.stuck_high_b" Set, "sensor.hall_c": "hall.stuck_high_c" Set),
+            places: phases!("sensor.hall_": "hall.stuck_high_" Set),
             effect: "1: the sensor always reads high: wrong sectors, the code 111, a hall fault of the control unit",
             source: "T3 Table 1.1 (position sensor)",
             rate: POSITION_SENSOR,
@@ -160,7 +142,7 @@ fn sensors() -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("sensor.hall_a": "hall.stuck_low_a" Set, "sensor.hall_b": "hall.stuck_low_b" Set, "sensor.hall_c": "hall.stuck_low_c" Set),
+            places: phases!("sensor.hall_": "hall.stuck_low_" Set),
             effect: "1: the sensor always reads low: wrong sectors, the code 000, a hall fault of the control unit",
             source: "T3 Table 1.1 (position sensor)",
             rate: POSITION_SENSOR,

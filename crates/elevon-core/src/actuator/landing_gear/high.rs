@@ -3,13 +3,11 @@
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL};
-use super::LandingGear;
-use crate::actuator::{Finding, Inputs, Setup, Signals, Tick, Watch, Wiring, WATCHED};
-use crate::control::pi_rate::PiRateParameter;
+use super::Fidelity;
+use crate::actuator::{Finding, Inputs, Observation};
 use crate::inverter::bridge::{extinguish, Bridge, BridgeState, BridgeStructure, InverterParameter, Windings, INVERTER};
 use crate::inverter::six_step::{self, SixStepParameter};
 use crate::kept;
-use crate::kept::{Kept, Store};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
@@ -187,25 +185,9 @@ fn terminals<S: Scalar>(raw: &[S]) -> [S; INVERTER.len()] {
     inverter
 }
 
-/// `plain` is memory for the parameters as plain numbers.
-fn derive<S: Scalar>(raw: &[S], structure: &Structure, plain: Vec<Vec<f64>>) -> Model<S> {
-    let dt = raw[SolverParameter::Step.at()];
-    let mechanical = raw[SolverParameter::MechanicalStep.at()];
-    Model {
-        c: Constants::derive(raw, structure, plain, dt, mechanical),
-        bridge: Bridge::derive(&terminals(raw)),
-        per_torque_steps: S::one() / mechanical,
-        mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
-    }
-}
-
-impl Wiring for High {
-    type Structure = Structure;
+impl Fidelity for High {
     type Model<S: Scalar> = Model<S>;
     type State<S: Scalar> = State<S>;
-
-    type Machine = LandingGear;
-    const INITIAL: &'static [&'static str] = super::INITIAL;
 
     fn signals() -> &'static [Signal] {
         ALL
@@ -213,77 +195,56 @@ impl Wiring for High {
     fn step(raw: &[f64]) -> f64 {
         raw[SolverParameter::Step.at()]
     }
-    fn fault_grid(raw: &[f64]) -> f64 {
-        raw[SolverParameter::FaultGrid.at()]
-    }
-    fn structure(setup: &Setup) -> Structure {
-        Structure::read(setup)
-    }
-    fn ticks(raw: &[f64], _structure: &Structure) -> Vec<Tick> {
-        super::control_tick(raw[PiRateParameter::Period.at()], raw[SolverParameter::Step.at()])
-    }
     fn check(raw: &[f64]) -> Vec<Finding> {
         super::checks::high(raw)
     }
 
-    fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
-        derive(raw, structure, Vec::new())
+    fn derive<S: Scalar>(raw: &[S], structure: &Structure, plain: Vec<Vec<f64>>) -> Model<S> {
+        let dt = raw[SolverParameter::Step.at()];
+        let mechanical = raw[SolverParameter::MechanicalStep.at()];
+        Model {
+            c: Constants::derive(raw, structure, plain, dt, mechanical),
+            bridge: Bridge::derive(&terminals(raw)),
+            per_torque_steps: S::one() / mechanical,
+            mechanical: ((mechanical.lane(0) / dt.lane(0)).round() as Steps).max(1),
+        }
     }
-    fn derive_anew<S: Scalar>(model: &mut Model<S>, raw: &[S], structure: &Structure) {
-        let plain = std::mem::take(&mut model.c.raw);
-        *model = derive(raw, structure, plain);
+    fn constants<S: Scalar>(model: &Model<S>) -> &Constants<S> {
+        &model.c
     }
-    fn keep(state: &mut State<f64>, store: &mut Store) {
-        state.keep(store);
+    fn plain<S: Scalar>(model: &mut Model<S>) -> Vec<Vec<f64>> {
+        std::mem::take(&mut model.c.raw)
+    }
+    fn body<S: Scalar>(state: &State<S>) -> &Body<S> {
+        &state.body
+    }
+    fn body_mut<S: Scalar>(state: &mut State<S>) -> &mut Body<S> {
+        &mut state.body
     }
 
-    fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
+    fn start<S: Scalar>(body: Body<S>) -> State<S> {
         let zero = S::zero();
-        State {
-            body: model.c.start(raw, initial),
-            current: [zero; 3],
-            legs: [zero; 3],
-            bridge: BridgeState::initial(),
-            cut: zero,
-            torque: zero,
-            voltage: [zero; 3],
-        }
+        State { body, current: [zero; 3], legs: [zero; 3], bridge: BridgeState::initial(), cut: zero, torque: zero, voltage: [zero; 3] }
     }
-
-    fn tick<S: Scalar>(
-        _kind: u8,
-        structure: &Structure,
-        m: &Model<S>,
-        inputs: &Inputs<S>,
-        s: &mut State<S>,
-        t: S,
-        noise: &mut dyn FnMut(u64) -> S,
-    ) {
-        m.c.tick(structure, &mut s.body, inputs, t, s.bridge.tripped, noise);
-    }
-
     #[inline(always)]
-    fn advance<S: Scalar>(
-        structure: &Structure,
-        models: &[Model<S>],
-        inputs: &[Inputs<S>],
-        states: &mut [State<S>],
-        from: Steps,
-        count: Steps,
-    ) {
-        for k in from..from + count {
-            for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
-                step(model, structure, inputs, state, k);
-            }
-        }
+    fn advance<S: Scalar>(model: &Model<S>, structure: &Structure, inputs: &Inputs<S>, state: &mut State<S>, k: Steps) {
+        step(model, structure, inputs, state, k);
+    }
+    /// Positive where the bridge has given up.
+    fn tripped<S: Scalar>(state: &State<S>) -> S {
+        state.bridge.tripped
+    }
+    fn current<S: Scalar>(state: &State<S>) -> S {
+        state.current[0].abs() + state.current[1].abs() + state.current[2].abs()
     }
 
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _selection: Signals, out: &mut [S]) {
+    fn observe<S: Scalar>(x: Observation<'_, Structure, Model<S>, State<S>, S>) {
+        let Observation { structure, model: m, inputs, state: s, t, out, .. } = x;
         let (k, _) = m.c.coupling(structure, s.body.motion.motor_position);
         let torque = m.c.star.saturate(m.c.star.torque(k, s.current));
         m.c.observe(structure, inputs, &s.body, torque, t, out);
         let half = S::splat(0.5);
-        let size = half * (s.current[0].abs() + s.current[1].abs() + s.current[2].abs());
+        let size = half * Self::current(s);
         out[Q::CurrentLine as usize] = torque.signed(size);
         let mut magnetic = S::zero();
         for j in 0..3 {
@@ -293,15 +254,5 @@ impl Wiring for High {
             magnetic = magnetic + half * s.current[j] * s.current[j] / m.c.star.per_inductance[j];
         }
         out[Q::EnergyMagnetic as usize] = magnetic;
-    }
-
-    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
-        super::watch(&s.body, s.current[0].abs() + s.current[1].abs() + s.current[2].abs())
-    }
-    fn tripped<S: Scalar>(s: &State<S>) -> S {
-        s.body.tripped()
-    }
-    fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
-        m.c.trip_reason(&s.body, lane)
     }
 }

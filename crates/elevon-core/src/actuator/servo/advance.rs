@@ -1,7 +1,7 @@
 //! The inner loop of the servos: inputs some steps ahead, chunks of lanes side by side.
 
 use super::layout::{BRAKE, COMMAND, OUTPUT, PORTS, SHAFT, SUPPLY};
-use crate::actuator::{Inputs, MAX_CHUNKS};
+use crate::actuator::{Inputs, Stretch, MAX_CHUNKS};
 use crate::scalar::{Kernel, Scalar};
 use crate::time::Steps;
 
@@ -120,23 +120,12 @@ pub(super) trait Stepper<S> {
     fn step(model: &Self::Model, structure: &Self::Structure, instant: &Instant<S>, state: &mut Self::State);
 }
 
-/// A stretch of steps of a block. It depends on no form of servo, so that all forms share its code.
-pub(super) struct Stretch<'a, M, Q, Z, S> {
-    pub structure: &'a Q,
-    pub models: &'a [M],
-    pub inputs: &'a [Inputs<S>],
-    pub states: &'a mut [Z],
-    pub from: Steps,
-    pub count: Steps,
+/// Takes the steps of a stretch. It depends on no form of servo, so that all forms share its code.
+pub(super) fn march<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Structure, T::Model, T::State, S>) {
+    S::vectorize(Run::<T, S>(x));
 }
 
-impl<M, Q, Z: Copy, S: Scalar> Stretch<'_, M, Q, Z, S> {
-    pub fn run<T: Stepper<S, Model = M, Structure = Q, State = Z>>(self) {
-        S::vectorize(Run::<T, S>(self));
-    }
-}
-
-struct Run<'a, T: Stepper<S>, S: Scalar>(Stretch<'a, T::Model, T::Structure, T::State, S>);
+struct Run<'a, T: Stepper<S>, S: Scalar>(Stretch<'a, T::Structure, T::Model, T::State, S>);
 
 impl<T: Stepper<S>, S: Scalar> Kernel for Run<'_, T, S> {
     type Output = ();
@@ -147,7 +136,7 @@ impl<T: Stepper<S>, S: Scalar> Kernel for Run<'_, T, S> {
 }
 
 #[inline(always)]
-fn advance<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Model, T::Structure, T::State, S>) {
+fn advance<T: Stepper<S>, S: Scalar>(x: Stretch<'_, T::Structure, T::Model, T::State, S>) {
     let Stretch { structure, models, inputs, states, from, count } = x;
     let (commanded, end) = (T::commanded(structure), from + count);
     if let (true, [model], [inputs], [state]) = (T::IN_REGISTERS, models, inputs, &mut *states) {

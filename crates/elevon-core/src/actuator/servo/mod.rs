@@ -7,6 +7,7 @@ mod checks;
 mod details;
 pub mod faults;
 mod form;
+mod heat;
 mod high;
 pub mod layout;
 mod low;

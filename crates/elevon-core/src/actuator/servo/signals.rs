@@ -2,8 +2,8 @@
 
 use super::shaft::TRAIN;
 use crate::scalar::Scalar;
-use crate::signals;
 use crate::variable::{extended, Signal};
+use crate::{signals, signals_of};
 
 signals! {
     /// Signals of the switching model.
@@ -90,44 +90,44 @@ signals! {
     }
 }
 
-signals! {
-    /// Signals of the reduced-order model: the same names where they mean the same.
-    LowSignal, LOW_SPECIFIC {
-        Command => "command", "-", "rad", "command (rad at the output, rad/s or N m by the control mode)", Command;
-        OutputPosition => "output_position", "theta_u", "rad", "output position", OutputPosition;
-        OutputSpeed => "output_speed", "omega_u", "rad/s", "output speed", OutputSpeed;
-        MotorPosition => "motor_position", "theta_m", "rad", "motor angle", MotorPosition;
-        MotorSpeed => "motor_speed", "omega_m", "rad/s", "motor speed", MotorSpeed;
-        SpeedRef => "speed_ref", "omega_ref", "rad/s", "speed reference", SpeedRef;
-        TorqueRef => "torque_ref", "T_ref", "N m", "torque reference after its limit", TorqueRef;
-        CurrentRef => "current_ref", "i_q_ref", "A", "quadrature current reference, peak", CurrentRef;
-        CurrentQ => "current_q", "i_q", "A", "quadrature current of the equivalent phase, peak", TorqueCurrent;
-        CurrentQMeas => "current_q_meas", "i_q_meas", "A", "measured quadrature current, filtered", TorqueCurrent;
-        VoltageQRef => "voltage_q_ref", "v_q", "V", "quadrature voltage of the equivalent phase", TorqueVoltage;
-        VoltageQMeas => "voltage_q_meas", "v_q_meas", "V", "quadrature voltage, filtered", TorqueVoltage;
-        MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque";
-        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the motor shaft, the brake's included";
-        BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose", Brake;
-        LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the motor shaft";
-        SupplyVoltage => "supply_voltage", "V_dc", "V", "DC link voltage", SupplyVoltage;
-        WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
-        WindingTemperatureHottest => "winding_temperature_hottest", "-", "K", "temperature of the hottest phase (thermal network): at standstill up to twice the winding's rise over the surface";
-        SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface", SurfaceTemperature;
-        HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
-        HeatPhaseHottest => "heat_phase_hottest", "-", "W", "heat of the phase that has most, mean of the network's last tick";
-        HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
-        ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
-        Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
-        EncoderPosition => "encoder_position", "-", "rad", "output position the encoder reports", OutputPosition;
-        ResolverPosition => "resolver_position", "-", "rad", "motor angle the resolver reports", MotorPosition;
-        ResolverSpeed => "resolver_speed", "-", "rad/s", "motor speed the resolver reports", MotorSpeed;
-        ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
-        Tripped => "tripped", "-", "1", "1 once the drive has tripped";
-        EnergyCopper => "energy_copper", "-", "J", "copper losses, counted with a thermal network";
-        EnergyHeatStored => "energy_heat_stored", "-", "J", "heat in winding and housing above that of the start";
-        EnergyAir => "energy_air", "-", "J", "heat given to the air";
-        StopTorque => "stop_torque", "-", "N m", "torque on the motor shaft that the end stop's reaction cancels";
-        AmbientTemperature => "ambient_temperature", "T_a", "K", "temperature of the air: thermal.ambient, or the input `ambient`";
+signals_of! {
+    /// Signals of the reduced-order model: those of the switching model that it has, too.
+    LowSignal, LOW_SPECIFIC of HighSignal, HIGH_SPECIFIC {
+        Command;
+        OutputPosition;
+        OutputSpeed;
+        MotorPosition;
+        MotorSpeed;
+        SpeedRef;
+        TorqueRef;
+        CurrentRef;
+        CurrentQ: "quadrature current of the equivalent phase, peak";
+        CurrentQMeas;
+        VoltageQRef: "quadrature voltage of the equivalent phase";
+        VoltageQMeas;
+        MotorTorque;
+        FrictionTorque;
+        BrakeTorque;
+        LoadTorque;
+        SupplyVoltage;
+        WindingTemperature;
+        WindingTemperatureHottest;
+        SurfaceTemperature;
+        HeatCopper;
+        HeatPhaseHottest;
+        HeatAir;
+        ThermalWarning;
+        Limited;
+        EncoderPosition;
+        ResolverPosition;
+        ResolverSpeed;
+        ResolverSignal;
+        Tripped;
+        EnergyCopper: "copper losses, counted with a thermal network";
+        EnergyHeatStored: "heat in winding and housing above that of the start";
+        EnergyAir;
+        StopTorque;
+        AmbientTemperature;
     }
 }
 

@@ -11,13 +11,11 @@ use self::pair::pair;
 use super::body::{Body, Constants, Structure, E_COPPER, E_INVERTER};
 use super::layout::*;
 use super::signals::{Quantity as Q, ALL, PHASES};
-use super::LandingGear;
-use crate::actuator::{Finding, Inputs, Setup, Signals, Tick, Watch, Wiring, WATCHED};
-use crate::control::pi_rate::PiRateParameter;
+use super::Fidelity;
+use crate::actuator::{Finding, Inputs, Observation};
 use crate::inverter::bridge::InverterParameter;
 use crate::inverter::six_step::{self, Chopping, SixStepParameter};
 use crate::kept;
-use crate::kept::{Kept, Store};
 use crate::scalar::Scalar;
 use crate::three;
 use crate::time::Steps;
@@ -124,27 +122,9 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     hand_over(s);
 }
 
-/// `plain` is memory for the parameters as plain numbers.
-fn derive<S: Scalar>(raw: &[S], structure: &Structure, plain: Vec<Vec<f64>>) -> Model<S> {
-    let dt = raw[LowParameter::Step.at()];
-    let c = Constants::derive(raw, structure, plain, dt, dt);
-    Model {
-        on_resistance: raw[InverterParameter::OnResistance.at()],
-        diode_drop: raw[InverterParameter::DiodeDrop.at()],
-        inductance: three!(|j| S::one() / c.star.per_inductance[j]),
-        commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
-        terminals: S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()])),
-        c,
-    }
-}
-
-impl Wiring for Low {
-    type Structure = Structure;
+impl Fidelity for Low {
     type Model<S: Scalar> = Model<S>;
     type State<S: Scalar> = State<S>;
-
-    type Machine = LandingGear;
-    const INITIAL: &'static [&'static str] = super::INITIAL;
 
     fn signals() -> &'static [Signal] {
         &ALL[..PHASES]
@@ -152,77 +132,55 @@ impl Wiring for Low {
     fn step(raw: &[f64]) -> f64 {
         raw[LowParameter::Step.at()]
     }
-    fn fault_grid(raw: &[f64]) -> f64 {
-        raw[SolverParameter::FaultGrid.at()].max(raw[LowParameter::Step.at()])
-    }
-    fn structure(setup: &Setup) -> Structure {
-        Structure::read(setup)
-    }
-    fn ticks(raw: &[f64], _structure: &Structure) -> Vec<Tick> {
-        super::control_tick(raw[PiRateParameter::Period.at()], raw[LowParameter::Step.at()])
-    }
     fn check(raw: &[f64]) -> Vec<Finding> {
         super::checks::low(raw)
     }
 
-    fn derive<S: Scalar>(raw: &[S], structure: &Structure) -> Model<S> {
-        derive(raw, structure, Vec::new())
+    fn derive<S: Scalar>(raw: &[S], structure: &Structure, plain: Vec<Vec<f64>>) -> Model<S> {
+        let dt = raw[LowParameter::Step.at()];
+        let c = Constants::derive(raw, structure, plain, dt, dt);
+        Model {
+            on_resistance: raw[InverterParameter::OnResistance.at()],
+            diode_drop: raw[InverterParameter::DiodeDrop.at()],
+            inductance: three!(|j| S::one() / c.star.per_inductance[j]),
+            commutation: raw[LowParameter::CommutationFactor.at()] * c.star.pole_pairs,
+            terminals: S::indicator(S::splat(0.5).le(raw[SixStepParameter::TerminalsShorted.at()])),
+            c,
+        }
     }
-    fn derive_anew<S: Scalar>(model: &mut Model<S>, raw: &[S], structure: &Structure) {
-        let plain = std::mem::take(&mut model.c.raw);
-        *model = derive(raw, structure, plain);
+    fn constants<S: Scalar>(model: &Model<S>) -> &Constants<S> {
+        &model.c
     }
-    fn keep(state: &mut State<f64>, store: &mut Store) {
-        state.keep(store);
+    fn plain<S: Scalar>(model: &mut Model<S>) -> Vec<Vec<f64>> {
+        std::mem::take(&mut model.c.raw)
+    }
+    fn body<S: Scalar>(state: &State<S>) -> &Body<S> {
+        &state.body
+    }
+    fn body_mut<S: Scalar>(state: &mut State<S>) -> &mut Body<S> {
+        &mut state.body
     }
 
-    fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> State<S> {
-        let (zero, body) = (S::zero(), model.c.start(raw, initial));
+    fn start<S: Scalar>(body: Body<S>) -> State<S> {
+        let zero = S::zero();
         let handover = Handover { outgoing: zero, demand: six_step::demand(body.hall.code), change: [zero; 3] };
         State { body, current: zero, line: zero, torque: zero, tripped: zero, handover }
     }
-
-    fn tick<S: Scalar>(
-        _kind: u8,
-        structure: &Structure,
-        m: &Model<S>,
-        inputs: &Inputs<S>,
-        s: &mut State<S>,
-        t: S,
-        noise: &mut dyn FnMut(u64) -> S,
-    ) {
-        m.c.tick(structure, &mut s.body, inputs, t, s.tripped, noise);
-    }
-
     #[inline(always)]
-    fn advance<S: Scalar>(
-        structure: &Structure,
-        models: &[Model<S>],
-        inputs: &[Inputs<S>],
-        states: &mut [State<S>],
-        from: Steps,
-        count: Steps,
-    ) {
-        for k in from..from + count {
-            for ((model, inputs), state) in models.iter().zip(inputs).zip(states.iter_mut()) {
-                step(model, structure, inputs, state, k);
-            }
-        }
+    fn advance<S: Scalar>(model: &Model<S>, structure: &Structure, inputs: &Inputs<S>, state: &mut State<S>, k: Steps) {
+        step(model, structure, inputs, state, k);
+    }
+    fn tripped<S: Scalar>(state: &State<S>) -> S {
+        state.tripped
+    }
+    fn current<S: Scalar>(state: &State<S>) -> S {
+        state.current
     }
 
-    fn observe<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inputs<S>, s: &State<S>, t: S, _selection: Signals, out: &mut [S]) {
+    fn observe<S: Scalar>(x: Observation<'_, Structure, Model<S>, State<S>, S>) {
+        let Observation { structure, model: m, inputs, state: s, t, out, .. } = x;
         m.c.observe(structure, inputs, &s.body, s.torque, t, out);
         out[Q::CurrentLine as usize] = s.line;
         out[Q::EnergyMagnetic as usize] = S::splat(0.5) * pair(m, structure, s).inductance * s.current * s.current;
-    }
-
-    fn watch<S: Scalar>(s: &State<S>) -> [Watch<S>; WATCHED] {
-        super::watch(&s.body, s.current)
-    }
-    fn tripped<S: Scalar>(s: &State<S>) -> S {
-        s.body.tripped()
-    }
-    fn trip_reason<S: Scalar>(m: &Model<S>, s: &State<S>, lane: usize) -> Option<String> {
-        m.c.trip_reason(&s.body, lane)
     }
 }

@@ -1,10 +1,10 @@
 //! Faults of the controller and of the sensors of position.
 
-use super::{attribute, Side};
+use super::Side;
 use crate::fault::rate::{CONTROLLER, POSITION_SENSOR, SWITCH};
 use crate::fault::{Attribute, FaultKind};
-use crate::places;
 use crate::variable::Range;
+use crate::{phases, places};
 
 /// Faults of controller and position sensors.
 pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
@@ -13,20 +13,20 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
     const SECTORS: &[Attribute] = &[
         Attribute {
             default: Some(1.0),
-            ..attribute("sectors", "1", "sensor.encoder.dark_sectors", "number of dark sectors, equal and evenly spread")
+            ..Attribute::new("sectors", "1", "sensor.encoder.dark_sectors", "number of dark sectors, equal and evenly spread")
         },
         Attribute {
             default: Some(0.0),
-            ..attribute("position", "rad", "sensor.encoder.dark_position", "angle of the disc at the middle of a dark sector")
+            ..Attribute::new("position", "rad", "sensor.encoder.dark_position", "angle of the disc at the middle of a dark sector")
         },
     ];
     const FIRST: &[Attribute] = &[Attribute {
         default: Some(0.0),
-        ..attribute("phase", "rad", "sensor.encoder.first_phase", "phase of the error where the output stands at zero")
+        ..Attribute::new("phase", "rad", "sensor.encoder.first_phase", "phase of the error where the output stands at zero")
     }];
     const SECOND: &[Attribute] = &[Attribute {
         default: Some(0.0),
-        ..attribute("phase", "rad", "sensor.encoder.second_phase", "phase of the error where the output stands at zero")
+        ..Attribute::new("phase", "rad", "sensor.encoder.second_phase", "phase of the error where the output stands at zero")
     }];
     vec![
         FaultKind {
@@ -197,7 +197,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("sensor.current_a": "sensor.current.stuck_a" Set, "sensor.current_b": "sensor.current.stuck_b" Set, "sensor.current_c": "sensor.current.stuck_c" Set),
+            places: phases!("sensor.current_": "sensor.current.stuck_" Set),
             effect: "1: the current sensor stands still at its value of the onset: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
             source: "ASSUMED: the usual failure of a sensor's electronics, in addition to gain and offset of T2",
             rate: SWITCH,
@@ -217,7 +217,7 @@ pub fn control_and_sensors(side: Side) -> Vec<FaultKind> {
             unit: "1",
             range: Range::Unit,
             attributes: &[],
-            places: places!("sensor.current_a": "sensor.current.dead_a" Set, "sensor.current_b": "sensor.current.dead_b" Set, "sensor.current_c": "sensor.current.dead_c" Set),
+            places: phases!("sensor.current_": "sensor.current.dead_" Set),
             effect: "1: the current sensor reports zero: its leg controls nothing; between relays the other two legs leave its phase what the star allows, a carrier drive controls a wrong current",
             source: "ASSUMED: broken wire, in addition to gain and offset of T2",
             rate: SWITCH,

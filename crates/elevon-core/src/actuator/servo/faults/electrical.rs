@@ -1,61 +1,65 @@
 //! Faults of the motor's windings and magnets, of the inverter and of its current sensors.
 
-use super::attribute;
 use crate::fault::rate::{BEARINGS, CONNECTOR, MOTOR, SWITCH};
 use crate::fault::{Attribute, FaultKind};
-use crate::places;
 use crate::variable::Range;
+use crate::{phases, places};
 
 /// Faults of a star motor and its inverter.
 pub fn electrical() -> Vec<FaultKind> {
-    const PHASE: &[Attribute] = &[attribute(
+    const PHASE: &[Attribute] = &[Attribute::new(
         "phase",
         "rad",
         "motor.eccentricity_static_phase",
         "phase angle of the narrow gap: electrical in the published law, round the stator in the periodic one",
     )];
     const PHASE_DYNAMIC: &[Attribute] =
-        &[attribute("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
+        &[Attribute::new("phase", "rad", "motor.eccentricity_dynamic_phase", "mechanical phase angle of the narrow gap")];
     const REFERENCE: &[Attribute] = &[Attribute {
         default: Some(25.0),
-        ..attribute("reference", "ohm", "motor.tap_reference", "resistance that stands for a level of one half")
+        ..Attribute::new("reference", "ohm", "motor.tap_reference", "resistance that stands for a level of one half")
     }];
     const UNBALANCE: &[Attribute] = &[
-        attribute("phase", "rad", "motor.unbalance_phase", "mechanical angle of the excess mass"),
+        Attribute::new("phase", "rad", "motor.unbalance_phase", "mechanical angle of the excess mass"),
         Attribute {
             default: Some(1.0),
-            ..attribute("gap_share", "1", "motor.unbalance_gap_share", "dynamic eccentricity per share of excess inertia")
+            ..Attribute::new("gap_share", "1", "motor.unbalance_gap_share", "dynamic eccentricity per share of excess inertia")
         },
     ];
-    const CONTACT: &[Attribute] = &[attribute(
+    const CONTACT: &[Attribute] = &[Attribute::new(
         "contact_resistance",
         "ohm",
         "motor.short_contact_resistance",
         "resistance of the short itself (loop model); without limit it is the healthy motor",
     )];
     const POLE: &[Attribute] = &[
-        attribute("phase", "rad", "motor.pole_loss_phase", "mechanical angle of the weak pole pair"),
-        attribute("concentration", "1", "motor.pole_concentration", "1: a phase's coils stand under one pole pair, 0: evenly under all"),
+        Attribute::new("phase", "rad", "motor.pole_loss_phase", "mechanical angle of the weak pole pair"),
+        Attribute::new(
+            "concentration",
+            "1",
+            "motor.pole_concentration",
+            "1: a phase's coils stand under one pole pair, 0: evenly under all",
+        ),
     ];
-    const TOUCHING: &[Attribute] = &[attribute(
+    const TOUCHING: &[Attribute] = &[Attribute::new(
         "turns",
         "1",
         "motor.phase_short_turns",
         "fraction of the turns between neutral and contact, of all pairs; 1: the terminals",
     )];
     const GROUNDED: &[Attribute] = &[
-        attribute(
+        Attribute::new(
             "turns",
             "1",
             "motor.ground_short_turns",
             "fraction of the turns between neutral and contact, of all phases; 1: the terminal",
         ),
-        attribute("potential", "1", "motor.ground_potential", "place of ground in the link: 0 lower rail, 1 upper rail"),
+        Attribute::new("potential", "1", "motor.ground_potential", "place of ground in the link: 0 lower rail, 1 upper rail"),
     ];
     vec![
         FaultKind {
             kind: "short", unit: "1", range: Range::Between(0.0, 0.95), attributes: CONTACT,
-            places: places!("motor.phase_a": "motor.turns_a" Lose, "motor.phase_b": "motor.turns_b" Lose, "motor.phase_c": "motor.turns_c" Lose),
+            places: phases!("motor.phase_": "motor.turns_" Lose),
             effect: "fraction of the turns of a phase shorted: R ~ N, L ~ N^2, k ~ N; ripple at twice the electrical frequency; with motor.short_model = loop the turns are there, carry a current of their own, brake and heat",
             source: "T2 (fault coefficients N_j), N 5.2",
             rate: MOTOR,
@@ -76,21 +80,21 @@ pub fn electrical() -> Vec<FaultKind> {
         },
         FaultKind {
             kind: "resistor_short", unit: "1", range: Range::Between(0.0, 0.5), attributes: REFERENCE,
-            places: places!("motor.phase_a": "motor.tap_level_a" Add, "motor.phase_b": "motor.tap_level_b" Add, "motor.phase_c": "motor.tap_level_c" Add),
+            places: phases!("motor.phase_": "motor.tap_level_" Add),
             effect: "level f of a resistor ref (1 - f)/f from a terminal to the centre tap: it draws V/R whatever the speed and leaves the winding alone",
             source: "N 4.3 (seeded winding short)",
             rate: MOTOR,
         },
         FaultKind {
             kind: "phase_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: TOUCHING,
-            places: places!("motor.phases_ab": "motor.phase_short_ab" Add, "motor.phases_bc": "motor.phase_short_bc" Add, "motor.phases_ca": "motor.phase_short_ca" Add),
+            places: places!(each [ab bc ca] "motor.phases_": "motor.phase_short_" Add),
             effect: "conductance of a contact between the windings of two phases: the drive feeds it with them, their torque falls, the contact heats",
             source: "T3 Table 1.1 (phase-to-phase short); place and circuit ASSUMED",
             rate: MOTOR,
         },
         FaultKind {
             kind: "ground_short", unit: "S", range: Range::Between(0.0, 1e3), attributes: GROUNDED,
-            places: places!("motor.phase_a": "motor.ground_short_a" Add, "motor.phase_b": "motor.ground_short_b" Add, "motor.phase_c": "motor.ground_short_c" Add),
+            places: phases!("motor.phase_": "motor.ground_short_" Add),
             effect: "conductance of a contact from a winding to the drive's ground: its current returns by the link, so the phase currents no longer sum to zero",
             source: "T3 Table 1.1 (turn-to-ground short); N 4.3 (resistance from a leg to the drive's ground)",
             rate: MOTOR,
@@ -104,29 +108,21 @@ pub fn electrical() -> Vec<FaultKind> {
         },
         FaultKind {
             kind: "open_phase", unit: "1", range: Range::Unit, attributes: &[],
-            places: places!("motor.phase_a": "motor.open_a" Set, "motor.phase_b": "motor.open_b" Set, "motor.phase_c": "motor.open_c" Set),
+            places: phases!("motor.phase_": "motor.open_" Set),
             effect: "1: the phase is interrupted, from its next current zero on; the other two form one loop",
             source: "T3 Table 1.1 (open circuit)",
             rate: MOTOR,
         },
         FaultKind {
             kind: "open_switch", unit: "1", range: Range::Unit, attributes: &[],
-            places: places!(
-                "inverter.a_high": "inverter.open_a_high" Set, "inverter.a_low": "inverter.open_a_low" Set,
-                "inverter.b_high": "inverter.open_b_high" Set, "inverter.b_low": "inverter.open_b_low" Set,
-                "inverter.c_high": "inverter.open_c_high" Set, "inverter.c_low": "inverter.open_c_low" Set,
-            ),
+            places: places!(each [a_high a_low b_high b_low c_high c_low] "inverter.": "inverter.open_" Set),
             effect: "1: the switch never closes; half waves of its phase current are missing",
             source: "T3 Table 1.1 (open circuit)",
             rate: SWITCH,
         },
         FaultKind {
             kind: "shorted_switch", unit: "1", range: Range::Unit, attributes: &[],
-            places: places!(
-                "inverter.a_high": "inverter.shorted_a_high" Set, "inverter.a_low": "inverter.shorted_a_low" Set,
-                "inverter.b_high": "inverter.shorted_b_high" Set, "inverter.b_low": "inverter.shorted_b_low" Set,
-                "inverter.c_high": "inverter.shorted_c_high" Set, "inverter.c_low": "inverter.shorted_c_low" Set,
-            ),
+            places: places!(each [a_high a_low b_high b_low c_high c_low] "inverter.": "inverter.shorted_" Set),
             effect: "1: the switch is always closed; the first gate of its partner shoots through and the drive trips",
             source: "T3 Table 1.1 (short)",
             rate: SWITCH,
@@ -161,14 +157,14 @@ pub fn electrical() -> Vec<FaultKind> {
         },
         FaultKind {
             kind: "gain", unit: "1", range: Range::Between(-1.0, 10.0), attributes: &[],
-            places: places!("sensor.current_a": "sensor.current.gain_a" Grow, "sensor.current_b": "sensor.current.gain_b" Grow, "sensor.current_c": "sensor.current.gain_c" Grow),
+            places: phases!("sensor.current_": "sensor.current.gain_" Grow),
             effect: "relative gain error of a current sensor: the drive controls the wrong current, ripple at twice the electrical frequency",
             source: "T2 (acquisition)",
             rate: SWITCH,
         },
         FaultKind {
             kind: "offset", unit: "A", range: Range::Any, attributes: &[],
-            places: places!("sensor.current_a": "sensor.current.offset_a" Add, "sensor.current_b": "sensor.current.offset_b" Add, "sensor.current_c": "sensor.current.offset_c" Add),
+            places: phases!("sensor.current_": "sensor.current.offset_" Add),
             effect: "offset of a current sensor: torque ripple at the electrical frequency",
             source: "T2 (acquisition)",
             rate: SWITCH,

@@ -1,6 +1,6 @@
 //! Faults of the transmission, the bearings and the gap.
 
-use super::{attribute, Side};
+use super::Side;
 use crate::fault::rate::{BEARINGS, MECHANISM};
 use crate::fault::{Attribute, FaultKind};
 use crate::places;
@@ -10,11 +10,11 @@ use crate::variable::Range;
 pub fn mechanical(side: Side) -> Vec<FaultKind> {
     const DEPTH: &[Attribute] = &[Attribute {
         default: Some(2e-4),
-        ..attribute("depth", "m", "bearing.defect_depth", "depth, unless the sag of a ball over the length is less")
+        ..Attribute::new("depth", "m", "bearing.defect_depth", "depth, unless the sag of a ball over the length is less")
     }];
     const CHIP: &[Attribute] = &[Attribute {
         default: Some(0.0),
-        ..attribute("angle", "rad", "gear.tooth_chip_angle", "angle of the wheel at which the chipped tooth carries")
+        ..Attribute::new("angle", "rad", "gear.tooth_chip_angle", "angle of the wheel at which the chipped tooth carries")
     }];
     vec![
         FaultKind {

@@ -6,25 +6,6 @@ mod mechanical;
 
 use crate::fault::{Attribute, FaultKind};
 
-#[macro_export]
-macro_rules! targets {
-    ($($path:literal $op:ident),*) => {{
-        const TARGETS: &[$crate::fault::Target] = &[$($crate::fault::Target { path: $path, op: $crate::fault::Op::$op }),*];
-        TARGETS
-    }};
-}
-#[macro_export]
-macro_rules! places {
-    ($($name:literal: $path:literal $op:ident),* $(,)?) => {{
-        const PLACES: &[$crate::fault::Place] = &[$($crate::fault::Place { name: $name, targets: $crate::targets!($path $op) }),*];
-        PLACES
-    }};
-}
-
-pub const fn attribute(name: &'static str, unit: &'static str, path: &'static str, text: &'static str) -> Attribute {
-    Attribute { name, unit, default: None, path, flag: "", text }
-}
-
 /// What differs between a turning and a travelling output.
 #[derive(Clone, Copy, Debug)]
 pub struct Side {

@@ -6,7 +6,8 @@ use super::electric::{book, connect, coupling_at, resistance, Coupling, Fed, Gat
 use super::model::{Model, State};
 use super::shorted::shorted_step;
 use super::step::{acquire, lose_switching, measure, move_on, park, sense, Feed};
-use crate::actuator::servo::advance::{Instant, Stepper};
+use super::Behind;
+use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::details::Structure;
 use crate::inverter::bridge::{extinguish, Legs, Pulses, Windings};
 use crate::inverter::carrier::Pulse;
@@ -228,25 +229,13 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     move_on::<S, FULL, FULL>(m, structure, x, s, (m.star.saturate(wound.torque), wound.current));
 }
 
-/// The step of the inner loop behind a carrier, with every detail or with none.
-pub(crate) struct CarrierStep<const FULL: bool>;
+/// Behind a carrier.
+pub(super) struct ByCarrier<const FULL: bool>;
 
-impl<S: Scalar, const FULL: bool> Stepper<S> for CarrierStep<FULL> {
-    type Model = Model<S>;
-    type Structure = Structure;
-    type State = State<S>;
-    const IN_REGISTERS: bool = !FULL;
-
+impl<const FULL: bool> Behind for ByCarrier<FULL> {
+    const FULL: bool = FULL;
     #[inline(always)]
-    fn commanded(structure: &Structure) -> bool {
-        structure.control_every_step
-    }
-    #[inline(always)]
-    fn dt(model: &Model<S>) -> S {
-        model.dt
-    }
-    #[inline(always)]
-    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
-        step::<S, FULL>(model, structure, instant, state);
+    fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+        step::<S, FULL>(m, structure, x, s);
     }
 }

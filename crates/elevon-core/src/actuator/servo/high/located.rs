@@ -7,7 +7,8 @@ use super::crossing::{turned, Seen, Switched};
 use super::electric::coupling_at;
 use super::model::{Model, State};
 use super::step::{acquire, lose_switching, measure, move_on, park, sense, Feed};
-use crate::actuator::servo::advance::{Instant, Stepper};
+use super::Behind;
+use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::details::Structure;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step, transition};
 use crate::scalar::{three_phase, Scalar};
@@ -74,25 +75,13 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     move_on::<S, FULL, FULL>(m, structure, x, s, (torque, wound.current));
 }
 
-/// The step of the inner loop behind located relays, with every detail or with none.
-pub(crate) struct LocatedStep<const FULL: bool>;
+/// Behind relays that act at the instant of their crossing.
+pub(super) struct ByLocatedRelays<const FULL: bool>;
 
-impl<S: Scalar, const FULL: bool> Stepper<S> for LocatedStep<FULL> {
-    type Model = Model<S>;
-    type Structure = Structure;
-    type State = State<S>;
-    const IN_REGISTERS: bool = !FULL;
-
+impl<const FULL: bool> Behind for ByLocatedRelays<FULL> {
+    const FULL: bool = FULL;
     #[inline(always)]
-    fn commanded(structure: &Structure) -> bool {
-        structure.control_every_step
-    }
-    #[inline(always)]
-    fn dt(model: &Model<S>) -> S {
-        model.dt
-    }
-    #[inline(always)]
-    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
-        step::<S, FULL>(model, structure, instant, state);
+    fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+        step::<S, FULL>(m, structure, x, s);
     }
 }

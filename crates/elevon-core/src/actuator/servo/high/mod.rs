@@ -4,26 +4,24 @@ mod carrier;
 mod crossing;
 mod electric;
 mod located;
-pub(crate) mod model;
-pub(crate) mod observe;
+mod model;
+mod observe;
 mod shorted;
 mod start;
 mod step;
 mod tick;
 
-use self::carrier::CarrierStep;
-use self::located::LocatedStep;
+use self::carrier::ByCarrier;
+use self::located::ByLocatedRelays;
 use self::model::{Model, State};
-use self::observe::Observation;
-use self::step::HighStep;
-use crate::actuator::servo::advance::Stretch;
+use self::step::ByRelays;
+use crate::actuator::servo::advance::{march, Instant, Stepper};
 use crate::actuator::servo::details::{Needs, Structure};
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
-use crate::actuator::{Finding, Inputs, Overheat, Setup, Signals, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{EventOf, Finding, ObservationOf, Overheat, Setup, StretchOf, Tick, Watch, Wiring, WATCHED};
 use crate::kept::{Kept, Store};
 use crate::scalar::{apart, Scalar};
-use crate::time::Steps;
 use crate::variable::Signal;
 use std::marker::PhantomData;
 
@@ -86,53 +84,29 @@ impl<F: Form> Wiring for High<F> {
         start::refresh(model, structure, raw, state);
     }
 
-    fn tick<S: Scalar>(
-        kind: u8,
-        structure: &Structure,
-        model: &Model<S>,
-        inputs: &Inputs<S>,
-        state: &mut State<S>,
-        t: S,
-        noise: &mut dyn FnMut(u64) -> S,
-    ) {
-        apart::<S, _>(tick::Event { kind, structure, model, inputs, state, t, noise });
+    fn tick<S: Scalar>(event: EventOf<'_, Self, S>) {
+        apart::<S, _>(event);
     }
 
     #[inline(always)]
-    fn advance<S: Scalar>(
-        structure: &Structure,
-        models: &[Model<S>],
-        inputs: &[Inputs<S>],
-        states: &mut [State<S>],
-        from: Steps,
-        count: Steps,
-    ) {
-        let x = Stretch { structure, models, inputs, states, from, count };
-        let (full, extra) = (structure.full || !S::FORMS, structure.extra || !S::FORMS);
-        if structure.drive == DriveKind::Pwm {
-            return if full { x.run::<CarrierStep<true>>() } else { x.run::<CarrierStep<false>>() };
+    fn advance<S: Scalar>(x: StretchOf<'_, Self, S>) {
+        let (full, extra) = (x.structure.full || !S::FORMS, x.structure.extra || !S::FORMS);
+        if x.structure.drive == DriveKind::Pwm {
+            return if full { march::<HighStep<ByCarrier<true>>, S>(x) } else { march::<HighStep<ByCarrier<false>>, S>(x) };
         }
-        if structure.located {
-            return if full { x.run::<LocatedStep<true>>() } else { x.run::<LocatedStep<false>>() };
+        if x.structure.located {
+            return if full { march::<HighStep<ByLocatedRelays<true>>, S>(x) } else { march::<HighStep<ByLocatedRelays<false>>, S>(x) };
         }
         match (full, extra) {
-            (false, _) => x.run::<HighStep<false, false>>(),
-            (true, false) => x.run::<HighStep<true, false>>(),
-            (true, true) => x.run::<HighStep<true, true>>(),
+            (false, _) => march::<HighStep<ByRelays<false, false>>, S>(x),
+            (true, false) => march::<HighStep<ByRelays<true, false>>, S>(x),
+            (true, true) => march::<HighStep<ByRelays<true, true>>, S>(x),
         }
     }
 
-    fn observe<S: Scalar>(
-        structure: &Structure,
-        model: &Model<S>,
-        inputs: &Inputs<S>,
-        state: &State<S>,
-        t: S,
-        _selection: Signals,
-        out: &mut [S],
-    ) {
-        // A row costs what a step does, and there are hundreds of steps to a row.
-        apart::<S, _>(Observation { structure, model, inputs, state, t, linear: F::LINEAR, out });
+    /// A row costs what a step does, and there are hundreds of steps to a row: all signals, whatever the selection.
+    fn observe<S: Scalar>(observation: ObservationOf<'_, Self, S>) {
+        apart::<S, _>(observation);
     }
 
     #[inline(always)]
@@ -159,5 +133,35 @@ impl<F: Form> Wiring for High<F> {
     fn overheated<S: Scalar>(s: &State<S>) -> Option<Overheat<S>> {
         let network = &s.extra.network;
         Some(Overheat { over: network.over, temperature: network.winding })
+    }
+}
+
+/// One step of the switching model behind one kind of drive, with every detail or with none.
+pub(super) trait Behind {
+    /// The state leaves no registers for a detailed step.
+    const FULL: bool;
+    fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>);
+}
+
+/// That step as the inner loop calls it.
+struct HighStep<D>(PhantomData<D>);
+
+impl<S: Scalar, D: Behind> Stepper<S> for HighStep<D> {
+    type Model = Model<S>;
+    type Structure = Structure;
+    type State = State<S>;
+    const IN_REGISTERS: bool = !D::FULL;
+
+    #[inline(always)]
+    fn commanded(structure: &Structure) -> bool {
+        structure.control_every_step
+    }
+    #[inline(always)]
+    fn dt(model: &Model<S>) -> S {
+        model.dt
+    }
+    #[inline(always)]
+    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
+        D::step(model, structure, instant, state);
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::form::Form;
+use crate::actuator::servo::heat::{network, network_period};
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::{Sensed, Sensing};
 use crate::actuator::servo::shaft::{Shaft, ShaftState};
@@ -15,7 +16,7 @@ use crate::kept;
 use crate::motor::pole::WeakPole;
 use crate::motor::short::{Discrete, Shorts};
 use crate::motor::star::{MotorParameter, Star, StarState};
-use crate::motor::thermal::{Network, NetworkState, ThermalModel, ThermalParameter};
+use crate::motor::thermal::{Network, NetworkState, ThermalParameter};
 use crate::scalar::Scalar;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::filter::closing;
@@ -162,25 +163,4 @@ impl<S: Scalar> Model<S> {
             },
         }
     }
-}
-
-/// The thermal network at the whole number of solver steps next to its sample time.
-pub(crate) fn network<S: Scalar>(raw: &[S], dt: f64) -> Network<S> {
-    let at = |p: MotorParameter| raw[p.at()];
-    let temperature = [
-        at(MotorParameter::ReferenceTemperature),
-        at(MotorParameter::TemperatureCoefficient),
-        at(MotorParameter::FluxTemperatureCoefficient),
-    ];
-    Network::derive(Raw(raw).thermal(), temperature, network_period(raw, dt))
-}
-
-/// Is there a thermal network?
-pub(crate) fn heated<S: Scalar>(raw: &[S]) -> bool {
-    ThermalModel::read(raw[ThermalParameter::Model.at()]) != ThermalModel::Off
-}
-
-/// Tick of the thermal network, s.
-pub(crate) fn network_period<S: Scalar>(raw: &[S], dt: f64) -> f64 {
-    (raw[ThermalParameter::SampleTime.at()].lane(0) / dt).round().max(1.0) * dt
 }

@@ -8,35 +8,23 @@ use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::shaft::ShaftSignals;
 use crate::actuator::servo::signals::{shared, HighSignal as Q, HIGH, HIGH_SPECIFIC};
-use crate::actuator::Inputs;
+use crate::actuator::{Inputs, Observation};
 use crate::motor::short::{GROUND, PAIR, TAPPED};
 use crate::scalar::{three_phase, Kernel, Scalar};
 use crate::three;
 
-/// What is observed of a chunk. It depends on no form of servo, so that all forms share its code.
-pub(crate) struct Observation<'a, S: Scalar> {
-    pub structure: &'a Structure,
-    pub model: &'a Model<S>,
-    pub inputs: &'a Inputs<S>,
-    pub state: &'a State<S>,
-    pub t: S,
-    /// With the signals of a screw, else with those of a gear of several bodies.
-    pub linear: bool,
-    pub out: &'a mut [S],
-}
-
-impl<S: Scalar> Kernel for Observation<'_, S> {
+impl<S: Scalar> Kernel for Observation<'_, Structure, Model<S>, State<S>, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self { structure, model, inputs, state, t, linear, out } = self;
+        let Self { structure, model, inputs, state, t, selection: _, out } = self;
         states(structure, model, state, t, out);
         out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
         electrical(structure, model, inputs, state, t, out);
         let x = Instant::at(inputs, t);
         let signals = mechanical(structure, model, &x, state, out);
         energies(model, structure, state, out);
-        if linear {
+        if structure.shaft.linear {
             screw(structure, model, &x, state, &signals, out);
         } else {
             let [first, second] = state.shaft.bodies.position;

@@ -1,8 +1,9 @@
 //! The state at the start of a run, and after a fault changed parameters.
 
-use super::model::{heated, network, ExtraState, Model, State};
+use super::model::{ExtraState, Model, State};
 use super::shorted::discrete;
 use crate::actuator::servo::details::Structure;
+use crate::actuator::servo::heat::{heated, network};
 use crate::actuator::servo::layout::*;
 use crate::control::current_dq::CurrentControlState;
 use crate::control::position_speed::PositionSpeedState;

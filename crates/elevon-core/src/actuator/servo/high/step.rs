@@ -4,7 +4,8 @@
 
 use super::electric::{coupling, electric_step, motor_torque};
 use super::model::{Model, State, E_INVERTER, E_SUPPLY};
-use crate::actuator::servo::advance::{Instant, Stepper};
+use super::Behind;
+use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::details::Structure;
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::{count_transitions, relays, six_step, transition};
@@ -240,25 +241,13 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     move_on::<S, FULL, EXTRA>(m, structure, x, s, (torque, current));
 }
 
-/// The step of the inner loop behind relays, or without a drive.
-pub(crate) struct HighStep<const FULL: bool, const EXTRA: bool>;
+/// Behind relays, or without a drive.
+pub(super) struct ByRelays<const FULL: bool, const EXTRA: bool>;
 
-impl<S: Scalar, const FULL: bool, const EXTRA: bool> Stepper<S> for HighStep<FULL, EXTRA> {
-    type Model = Model<S>;
-    type Structure = Structure;
-    type State = State<S>;
-    const IN_REGISTERS: bool = !FULL;
-
+impl<const FULL: bool, const EXTRA: bool> Behind for ByRelays<FULL, EXTRA> {
+    const FULL: bool = FULL;
     #[inline(always)]
-    fn commanded(structure: &Structure) -> bool {
-        structure.control_every_step
-    }
-    #[inline(always)]
-    fn dt(model: &Model<S>) -> S {
-        model.dt
-    }
-    #[inline(always)]
-    fn step(model: &Model<S>, structure: &Structure, instant: &Instant<S>, state: &mut State<S>) {
-        step::<S, FULL, EXTRA>(model, structure, instant, state);
+    fn step<S: Scalar>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+        step::<S, FULL, EXTRA>(m, structure, x, s);
     }
 }

@@ -7,7 +7,7 @@ use super::start::lubricate;
 use super::step::{control_step, link_voltage, park, seen_current, shaft_reading};
 use crate::actuator::servo::details::{sample_steps, Structure};
 use crate::actuator::servo::layout::*;
-use crate::actuator::{Inputs, Tick};
+use crate::actuator::{Event, Inputs, Tick};
 use crate::control::current_dq::{CurrentSample, PwmParameter};
 use crate::control::position_speed::ControlParameter;
 use crate::motor::thermal::ThermalParameter;
@@ -48,18 +48,7 @@ pub(super) fn all(raw: &[f64], structure: &Structure) -> Vec<Tick> {
     ticks
 }
 
-/// One tick of a chunk.
-pub(super) struct Event<'a, S: Scalar> {
-    pub kind: u8,
-    pub structure: &'a Structure,
-    pub model: &'a Model<S>,
-    pub inputs: &'a Inputs<S>,
-    pub state: &'a mut State<S>,
-    pub t: S,
-    pub noise: &'a mut dyn FnMut(u64) -> S,
-}
-
-impl<S: Scalar> Kernel for Event<'_, S> {
+impl<S: Scalar> Kernel for Event<'_, Structure, Model<S>, State<S>, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {

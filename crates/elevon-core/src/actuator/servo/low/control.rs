@@ -1,68 +1,12 @@
 //! The controller of the reduced-order model: P, and PID whose derivative acts as inertia (docs/explanation/theory/low-fidelity.md, "The speed
 //! derivative as inertia"); or one PID on the position. Jumps of the speed error pass the derivative's filter (`jump.rs`).
 
-use super::jump::Jumps;
-use super::model::{Model, State, Structure};
+use super::model::{Model, State};
+use super::structure::Structure;
 use crate::actuator::servo::advance::Instant;
-use crate::actuator::servo::layout::*;
-use crate::control::position_speed::{ControlParameter, ErrorHold, Mode};
+use crate::control::position_speed::{ErrorHold, Mode};
 use crate::scalar::Scalar;
 use crate::sensor::resolver::Reading;
-
-/// What the controller believes: P, and PID whose derivative acts as inertia; or one PID on the position with a filter.
-#[derive(Clone, Copy, Debug)]
-pub struct Control<S> {
-    per_dt: S,
-    position_gain: S,
-    feedforward: S,
-    speed_gain: S,
-    integral_step: S,
-    pub derivative_inertia: S,
-    /// Of the position PID: torque per difference of its filter, and the filter's share of a step.
-    derivative_gain: S,
-    derivative_decay: S,
-    jumps: Jumps<S>,
-    back_calculation: S,
-    threshold: S,
-    pub noise_deviation: S,
-    pub speed_limit: S,
-    pub torque_limit: S,
-    pub per_torque_constant: S,
-}
-
-impl<S: Scalar> Control<S> {
-    pub(super) fn derive(raw: &[S], structure: &Structure, ratio: S, dt: S) -> Self {
-        let at = |p: ControlParameter| raw[p.at()];
-        let (zero, one) = (S::zero(), S::one());
-        let pid = structure.control.pid;
-        let gain = if pid { at(ControlParameter::PidGain) } else { at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale) };
-        let ti = at(if pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
-        let integrates = zero.lt(ti);
-        // A torque command passes the loops by, their derivative included.
-        let by_inertia = structure.control.mode != Mode::Torque && !pid;
-        let td = at(ControlParameter::PidDerivativeTime);
-        let derives = zero.lt(td);
-        let passing = (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
-        let decay = S::select(derives, one - passing, one);
-        Self {
-            per_dt: one / dt,
-            position_gain: at(ControlParameter::PositionGain) * at(ControlParameter::PositionGainScale),
-            feedforward: at(ControlParameter::SpeedFeedforward) * ratio / dt,
-            speed_gain: gain,
-            integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
-            derivative_inertia: if by_inertia { gain * at(ControlParameter::DerivativeTime) } else { zero },
-            derivative_gain: gain * td / dt * decay,
-            derivative_decay: decay,
-            jumps: Jumps::derive(raw, by_inertia, dt),
-            back_calculation: at(ControlParameter::AntiWindupBackCalculation),
-            threshold: at(ControlParameter::AntiWindupThreshold),
-            noise_deviation: at(ControlParameter::NoiseDeviation),
-            speed_limit: at(ControlParameter::SpeedLimit),
-            torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
-            per_torque_constant: one / at(ControlParameter::TorqueConstant),
-        }
-    }
-}
 
 /// What the controller demands before the derivative of the speed is known.
 pub(super) struct Demand<S> {
@@ -95,15 +39,13 @@ fn speed_reference<S: Scalar>(
     let c = &m.control;
     let demanded = match structure.control.mode {
         Mode::Position if structure.control.feedforward => {
-            let moved = command - s.command;
-            s.command = command;
-            let ahead = S::select(moved.equals(moved), c.feedforward * moved, S::zero());
-            c.position_gain * position_error + ahead
+            let ahead = c.position.ahead(&mut s.command, command);
+            c.position.gain * position_error + ahead
         }
-        Mode::Position => c.position_gain * position_error,
+        Mode::Position => c.position.gain * position_error,
         Mode::Speed | Mode::Torque => command,
     };
-    let rise = if structure.control.mode == Mode::Position { c.position_gain * added } else { added };
+    let rise = if structure.control.mode == Mode::Position { c.position.gain * added } else { added };
     let reference = demanded.clamp_abs(c.speed_limit);
     [reference, (demanded + rise).clamp_abs(c.speed_limit) - reference]
 }

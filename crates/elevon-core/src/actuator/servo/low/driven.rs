@@ -3,33 +3,18 @@
 //! are stepped behind mean leg voltages, exactly for voltages held over a part of a step (docs/explanation/theory/low-fidelity.md,
 //! "Three windings behind mean legs").
 
-use super::model::{Model, State, Structure};
-use super::passive::{parts, per_winding};
-use super::phase::{coefficients, Phase};
+use super::model::{DrivenState, Model, Phase, State};
+use super::phase::coefficients;
 use super::relays::{aligned, Relays};
+use super::structure::Structure;
+use super::windings::{parts, per_winding, settled, Part};
 use crate::actuator::servo::layout::DriveKind;
-use crate::kept;
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
 
 /// Parts of a step at least: the current loop's lag is looked at by parts.
 const LEAST_PARTS: f64 = 8.0;
-
-/// What a drive remembers of its legs and integrals, V.
-#[derive(Clone, Copy, Debug)]
-pub struct DrivenState<S> {
-    pub(super) legs: [S; 3],
-    integral: [S; 2],
-}
-
-kept!(DrivenState<f64> as DrivenState { legs, integral });
-
-impl<S: Scalar> DrivenState<S> {
-    pub(super) fn initial() -> Self {
-        Self { legs: [S::zero(); 3], integral: [S::zero(); 2] }
-    }
-}
 
 /// A step of the windings behind the drive.
 pub(super) struct Driven<S> {
@@ -44,22 +29,6 @@ pub(super) struct Driven<S> {
     /// Quadrature component at the step's end, in the rotor's frame and as the drive's sensors report it.
     pub quadrature: S,
     pub seen: S,
-}
-
-/// One part of a step: what the drive sees, and the windings without its voltage.
-pub(super) struct Part<S> {
-    dt: S,
-    pub half_supply: S,
-    /// Current at the end with all legs at zero, but for the neutral.
-    free: [S; 3],
-    /// Current per volt held over the part; none of an interrupted phase.
-    pub per_volt: [S; 3],
-    /// How far each current would decay between the rails' pushes: to what its EMF drives.
-    pub drift: [S; 3],
-    pub sines: [S; 3],
-    cosines: [S; 3],
-    /// Speed that the drive believes.
-    speed: S,
 }
 
 /// The windings over a step from the phase currents `i`, with the torque current that the drive wants.
@@ -183,44 +152,10 @@ impl<S: Scalar> Carrier<S> {
     }
 }
 
-/// Currents after a part under leg voltages; the neutral keeps their sum at zero.
-#[inline(always)]
-pub(super) fn settled<S: Scalar>(part: &Part<S>, legs: [S; 3]) -> [S; 3] {
-    let (zero, one) = (S::zero(), S::one());
-    let g = part.per_volt;
-    let total = g[0] + g[1] + g[2];
-    let raised: [S; 3] = three!(|j| g[j].fma(legs[j], part.free[j]));
-    let closed: [S; 3] = three!(|j| S::select(g[j].equals(zero), zero, one));
-    let neutral = (closed[0] * raised[0] + closed[1] * raised[1] + closed[2] * raised[2]) / S::select(total.equals(zero), one, total);
-    // One closed phase alone carries nothing.
-    let alone = (closed[0] + closed[1] + closed[2]).lt(S::splat(1.5));
-    three!(|j| S::select(alone, zero, closed[j] * (raised[j] - g[j] * neutral)))
-}
-
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use super::super::windings::tests::{part, DT, L, R};
     use super::*;
-
-    const R: f64 = 2.0;
-    const L: f64 = 1e-2;
-    const DT: f64 = 5e-5;
-
-    /// A part of the star at rest with the currents `i`, phases interrupted where `open`.
-    pub fn part(i: [f64; 3], open: [bool; 3], angle: f64) -> Part<f64> {
-        let gain = (1.0 - (-DT * R / L).exp()) / R;
-        let per_volt = open.map(|gone| if gone { 0.0 } else { gain });
-        let (sines, cosines) = three_phase(angle.sin(), angle.cos());
-        Part {
-            dt: DT,
-            half_supply: 24.0,
-            free: three!(|j| i[j] - per_volt[j] * R * i[j]),
-            per_volt,
-            drift: [0.0; 3],
-            sines,
-            cosines,
-            speed: 0.0,
-        }
-    }
 
     fn charging(parts: i32) -> f64 {
         1.0 - (-f64::from(parts) * DT * R / L).exp()

@@ -7,27 +7,8 @@
 //! fidelity (motor/short). Turns that are not shorted carry the phase's current. The loop is stepped exactly for held right-hand
 //! sides, so any R_c runs; R_c without limit is the healthy winding.
 
-use super::model::State;
-use super::phase::Phase;
-use crate::actuator::servo::layout::*;
-use crate::motor::star::MotorParameter;
+use super::model::{Loops, Phase, State};
 use crate::scalar::Scalar;
-use crate::three;
-
-/// Constants of the loops; those of phases without a short are zero.
-#[derive(Clone, Copy, Debug)]
-pub struct Loops<S> {
-    /// Shorted turns over all and over the remaining ones.
-    turns: [S; 3],
-    ratio: [S; 3],
-    resistance: [S; 3],
-    contact: S,
-    mutual_per_dt: [S; 3],
-    /// dt / L_f.
-    dt_per_inductance: [S; 3],
-    /// Inductance of the turns outside the short, N L - M.
-    pub(super) intact: [S; 3],
-}
 
 /// What the loops add to a step.
 pub(super) struct Added<S> {
@@ -38,27 +19,6 @@ pub(super) struct Added<S> {
 }
 
 impl<S: Scalar> Loops<S> {
-    pub(super) fn derive(raw: &[S], dt: S) -> Self {
-        let at = |p: MotorParameter| raw[p.at()];
-        let (zero, one) = (S::zero(), S::one());
-        let intact: [S; 3] = three!(|j| raw[MotorParameter::TurnsA.at() + j]);
-        let turns: [S; 3] = three!(|j| one - intact[j]);
-        let inductance = at(MotorParameter::WindingInductance);
-        Self {
-            turns,
-            ratio: three!(|j| turns[j] / intact[j]),
-            resistance: three!(|j| turns[j] * at(MotorParameter::WindingResistance)),
-            contact: at(MotorParameter::ShortContactResistance),
-            mutual_per_dt: three!(|j| at(MotorParameter::ShortCoupling) * turns[j] * intact[j] * inductance / dt),
-            dt_per_inductance: three!(|j| {
-                let there = zero.lt(turns[j]);
-                let value = turns[j] * (one - at(MotorParameter::ShortCoupling) * intact[j]) * inductance;
-                S::select(there, dt / S::select(there, value, one), zero)
-            }),
-            intact: three!(|j| intact[j] * (one - at(MotorParameter::ShortCoupling) * turns[j]) * inductance),
-        }
-    }
-
     /// Steps the loops under phase currents that went from `before` to `after`.
     #[inline(always)]
     pub(super) fn step(&self, s: &mut State<S>, p: &Phase<S>, before: [S; 3], after: [S; 3]) -> Added<S> {

@@ -11,14 +11,16 @@ mod passive;
 mod phase;
 mod relays;
 mod step;
+mod structure;
+mod windings;
 
-use self::model::{Model, State, Structure};
-use self::observe::Observation;
+use self::model::{Model, State};
 use self::step::LowStep;
-use super::advance::Stretch;
+use self::structure::Structure;
+use super::advance::march;
 use super::form::Form;
 use super::layout::*;
-use crate::actuator::{Finding, Inputs, Overheat, Setup, Signals, Tick, Watch, Wiring, WATCHED};
+use crate::actuator::{Event, EventOf, Finding, ObservationOf, Overheat, Setup, StretchOf, Tick, Watch, Wiring, WATCHED};
 use crate::control::position_speed::ControlParameter;
 use crate::kept::{Kept, Store};
 use crate::motor::equivalent::LowParameter;
@@ -109,15 +111,8 @@ impl<F: Form> Wiring for Low<F> {
         m.sensing.join(&before.sensing, &after.sensing, &state.shaft, &mut state.sensed);
     }
 
-    fn tick<S: Scalar>(
-        kind: u8,
-        structure: &Structure,
-        m: &Model<S>,
-        _inputs: &Inputs<S>,
-        s: &mut State<S>,
-        _t: S,
-        noise: &mut dyn FnMut(u64) -> S,
-    ) {
+    fn tick<S: Scalar>(event: EventOf<'_, Self, S>) {
+        let Event { kind, structure, model: m, state: s, noise, .. } = event;
         match kind {
             TICK_THERMAL => {
                 m.network.tick(&mut s.network);
@@ -131,35 +126,19 @@ impl<F: Form> Wiring for Low<F> {
     }
 
     #[inline(always)]
-    fn advance<S: Scalar>(
-        structure: &Structure,
-        models: &[Model<S>],
-        inputs: &[Inputs<S>],
-        states: &mut [State<S>],
-        from: Steps,
-        count: Steps,
-    ) {
-        let x = Stretch { structure, models, inputs, states, from, count };
+    fn advance<S: Scalar>(x: StretchOf<'_, Self, S>) {
         if !S::FORMS {
-            return x.run::<LowStep<true, true>>();
+            return march::<LowStep<true, true>, S>(x);
         }
-        match (structure.full, structure.extra) {
-            (false, _) => x.run::<LowStep<false, false>>(),
-            (true, false) => x.run::<LowStep<true, false>>(),
-            (true, true) => x.run::<LowStep<true, true>>(),
+        match (x.structure.full, x.structure.extra) {
+            (false, _) => march::<LowStep<false, false>, S>(x),
+            (true, false) => march::<LowStep<true, false>, S>(x),
+            (true, true) => march::<LowStep<true, true>, S>(x),
         }
     }
 
-    fn observe<S: Scalar>(
-        structure: &Structure,
-        model: &Model<S>,
-        inputs: &Inputs<S>,
-        state: &State<S>,
-        t: S,
-        selection: Signals,
-        out: &mut [S],
-    ) {
-        apart::<S, _>(Observation { structure, model, inputs, state, t, selection, linear: F::LINEAR, out });
+    fn observe<S: Scalar>(observation: ObservationOf<'_, Self, S>) {
+        apart::<S, _>(observation);
     }
 
     #[inline(always)]

@@ -1,101 +1,28 @@
 //! Constants and state of a run in the reduced-order model.
 
-use super::control::Control;
-use super::driven::DrivenState;
-use super::jump::JumpState;
-use super::loops::Loops;
-use super::phase::Phase;
+use super::jump::{JumpState, Jumps};
+use super::structure::Structure;
 use crate::actuator::servo::form::Form;
-use crate::actuator::servo::high::model::{heated, network};
+use crate::actuator::servo::heat::{heated, network};
 use crate::actuator::servo::layout::*;
-use crate::actuator::servo::sensing::{Sensed, Sensing, SensingDetails};
-use crate::actuator::servo::shaft::{Shaft, ShaftDetails, ShaftNeeds, ShaftState};
+use crate::actuator::servo::sensing::{Sensed, Sensing};
+use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::PwmParameter;
-use crate::control::position_speed::{ControlParameter, ControlStructure};
-use crate::details;
-use crate::inverter::bridge::{Bridge, BridgeState, BridgeStructure, InverterParameter};
+use crate::control::position_speed::{ControlParameter, Mode, PositionLoop};
+use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::kept;
 use crate::motor::equivalent::{Circuit, LowParameter};
 use crate::motor::pole::WeakPole;
-use crate::motor::star::{interrupted, MotorParameter, MotorStructure, ShortModel, Star, StarState};
+use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
 use crate::motor::thermal::{Network, NetworkState};
 use crate::scalar::Scalar;
 use crate::sensor::current::CurrentSensorParameter;
 use crate::sensor::filter::closing;
-use crate::sensor::resolver::{Resolver, ResolverParameter};
 use crate::three;
 
 /// Error of the references, rad or relative, from which on three windings are stepped for good: the cosine is 0.995.
 const WHOLE: f64 = 0.1;
-
-details! {
-    /// What of a reduced-order servo model a run needs; equal over a lane block.
-    Structure, read<F>(parts: Parts)
-    always {
-        drive: DriveKind = DriveKind::read(parts.drive().value(DriveParameter::Kind));
-        bridge: BridgeStructure = BridgeStructure::gateless(&parts.inverter()).with_trips(DcLink::<f64>::trips(&parts.link()));
-        /// The references are blocks, not sines.
-        six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
-        control: ControlStructure = ControlStructure::read(&parts.control());
-        integral: bool = parts.control().used(if control.pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
-        /// The command carries noise.
-        noisy_command: bool = parts.control().used(ControlParameter::NoiseDeviation);
-        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::low::<F>(parts));
-        sensing: SensingDetails = SensingDetails::read::<F>(parts);
-        motor: MotorStructure = MotorStructure::read(&parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&parts.pole()));
-    }
-    full {
-        detailed_shaft = shaft.full;
-        detailed_sensing = sensing.full;
-    }
-    extra {
-        shorted = parts.motor().any_away([MotorParameter::TurnsA, MotorParameter::TurnsB, MotorParameter::TurnsC]);
-        /// A lost resolver opens the bridge.
-        stops = Resolver::<f64>::lost(&parts.resolver())
-            && FeedbackLoss::read(parts.drive().value(DriveParameter::FeedbackLoss)) == FeedbackLoss::Stop;
-        /// The bridge is without gates, now or later.
-        passive = drive == DriveKind::Off || stops || bridge.trips;
-        /// The current sensors of the phases differ.
-        gains = parts.current_sensor().any_away([
-            CurrentSensorParameter::GainA, CurrentSensorParameter::GainB, CurrentSensorParameter::GainC,
-        ]);
-        /// Shorted turns have currents of their own.
-        loops = shorted && ShortModel::read(parts.motor().value(MotorParameter::ShortModel)) == ShortModel::Loop;
-        /// The reading is lost or stands still: the drive comes to its voltage limit, where currents lag.
-        unseen = sensing.resolver && Resolver::<f64>::stands(&parts.resolver());
-        /// Coefficients vary with the rotor angle.
-        angle = (sensing.resolver && sensing.commutated)
-            || motor.dynamic_eccentricity
-            || motor.weak_pole
-            || motor.static_eccentricity
-            || motor.trapezoidal
-            || loops
-            || six_step
-            || passive
-            || gains
-            || unseen
-            || interrupted(&parts.motor())
-            || shorted;
-        /// The drive places its references by a reading that is not the shaft's angle.
-        misled = sensing.resolver && sensing.commutated;
-        /// One current does not stand for three: references that are not the rotor's or no sines, relays whose
-        /// references the star's currents cannot have all, integrals that no current follows, a voltage limit for long.
-        driven = match drive {
-            DriveKind::Hysteresis => six_step || gains || unseen || misled || interrupted(&parts.motor()),
-            DriveKind::Pwm => unseen || misled || interrupted(&parts.motor()),
-            DriveKind::Off => false,
-        };
-        /// Faults that come by degrees alone make it so: small ones leave one current.
-        gradual = driven && !(six_step || unseen || interrupted(&parts.motor()));
-        /// The references stand apart from the rotor by an angle that does not change.
-        turned = misled && parts.resolver().away(ResolverParameter::Offset);
-        heat = Network::<f64>::needed(&parts.thermal());
-        link = DcLink::<f64>::needed(&parts.link());
-        extra_shaft = shaft.extra;
-        extra_sensing = sensing.extra;
-    }
-}
 
 #[derive(Clone, Copy, Debug)]
 pub struct Model<S> {
@@ -145,6 +72,153 @@ pub struct Drive<S> {
     pub link: DcLink<S>,
     /// Share of the three windings' step in what a step does; the rest is that of one current.
     pub apart: S,
+}
+
+/// What the controller believes: P, and PID whose derivative acts as inertia; or one PID on the position with a filter.
+#[derive(Clone, Copy, Debug)]
+pub struct Control<S> {
+    pub(super) per_dt: S,
+    pub(super) position: PositionLoop<S>,
+    pub(super) speed_gain: S,
+    pub(super) integral_step: S,
+    pub derivative_inertia: S,
+    /// Of the position PID: torque per difference of its filter, and the filter's share of a step.
+    pub(super) derivative_gain: S,
+    pub(super) derivative_decay: S,
+    pub(super) jumps: Jumps<S>,
+    pub(super) back_calculation: S,
+    pub(super) threshold: S,
+    pub noise_deviation: S,
+    pub speed_limit: S,
+    pub torque_limit: S,
+    pub per_torque_constant: S,
+}
+
+impl<S: Scalar> Control<S> {
+    pub(super) fn derive(raw: &[S], structure: &Structure, ratio: S, dt: S) -> Self {
+        let at = |p: ControlParameter| raw[p.at()];
+        let (zero, one) = (S::zero(), S::one());
+        let pid = structure.control.pid;
+        let gain = if pid { at(ControlParameter::PidGain) } else { at(ControlParameter::SpeedGain) * at(ControlParameter::SpeedGainScale) };
+        let ti = at(if pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
+        let integrates = zero.lt(ti);
+        // A torque command passes the loops by, their derivative included.
+        let by_inertia = structure.control.mode != Mode::Torque && !pid;
+        let td = at(ControlParameter::PidDerivativeTime);
+        let derives = zero.lt(td);
+        let passing = (-(at(ControlParameter::PidDerivativeFilter) * dt / S::select(derives, td, one))).exp();
+        let decay = S::select(derives, one - passing, one);
+        Self {
+            per_dt: one / dt,
+            position: PositionLoop::derive(Raw(raw).control(), ratio, dt),
+            speed_gain: gain,
+            integral_step: S::select(integrates, gain / S::select(integrates, ti, one) * dt, zero),
+            derivative_inertia: if by_inertia { gain * at(ControlParameter::DerivativeTime) } else { zero },
+            derivative_gain: gain * td / dt * decay,
+            derivative_decay: decay,
+            jumps: Jumps::derive(raw, by_inertia, dt),
+            back_calculation: at(ControlParameter::AntiWindupBackCalculation),
+            threshold: at(ControlParameter::AntiWindupThreshold),
+            noise_deviation: at(ControlParameter::NoiseDeviation),
+            speed_limit: at(ControlParameter::SpeedLimit),
+            torque_limit: at(ControlParameter::TorqueConstant) * at(ControlParameter::CurrentLimit),
+            per_torque_constant: one / at(ControlParameter::TorqueConstant),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Phase<S> {
+    pub torque_constant: S,
+    pub circuit: Circuit<S>,
+    /// Torque per torque the controller believes in.
+    pub efficacy: S,
+    /// 1 / (J + efficacy K_p T_d): the derivative of the speed acts as inertia.
+    pub per_effective_inertia: S,
+    /// k_j of the phases, and the currents per ampere of the reference.
+    pub coefficients: [S; 3],
+    pub imposed: [S; 3],
+    /// Direct component of the EMF over the speed, in the frame of the references: none where they are well placed.
+    pub direct: S,
+    /// Angle and speed of the shaft by which the references are placed.
+    pub believed: [S; 2],
+    /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors report it.
+    pub quadrature: S,
+    pub seen: S,
+}
+
+impl<S: Scalar> Phase<S> {
+    #[inline(always)]
+    pub(super) fn new(torque_constant: S, circuit: Circuit<S>, control: &Control<S>, inertia: S) -> Self {
+        let efficacy = torque_constant * control.per_torque_constant;
+        let per_effective_inertia = S::one() / efficacy.fma(control.derivative_inertia, inertia);
+        let (zero, one) = ([S::zero(); 3], S::one());
+        Self {
+            torque_constant,
+            circuit,
+            efficacy,
+            per_effective_inertia,
+            coefficients: zero,
+            imposed: zero,
+            direct: S::zero(),
+            believed: [S::zero(); 2],
+            quadrature: one,
+            seen: one,
+        }
+    }
+}
+
+/// Constants of the loops; those of phases without a short are zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Loops<S> {
+    /// Shorted turns over all and over the remaining ones.
+    pub(super) turns: [S; 3],
+    pub(super) ratio: [S; 3],
+    pub(super) resistance: [S; 3],
+    pub(super) contact: S,
+    pub(super) mutual_per_dt: [S; 3],
+    /// dt / L_f.
+    pub(super) dt_per_inductance: [S; 3],
+    /// Inductance of the turns outside the short, N L - M.
+    pub(super) intact: [S; 3],
+}
+
+impl<S: Scalar> Loops<S> {
+    pub(super) fn derive(raw: &[S], dt: S) -> Self {
+        let at = |p: MotorParameter| raw[p.at()];
+        let (zero, one) = (S::zero(), S::one());
+        let intact: [S; 3] = three!(|j| raw[MotorParameter::TurnsA.at() + j]);
+        let turns: [S; 3] = three!(|j| one - intact[j]);
+        let inductance = at(MotorParameter::WindingInductance);
+        Self {
+            turns,
+            ratio: three!(|j| turns[j] / intact[j]),
+            resistance: three!(|j| turns[j] * at(MotorParameter::WindingResistance)),
+            contact: at(MotorParameter::ShortContactResistance),
+            mutual_per_dt: three!(|j| at(MotorParameter::ShortCoupling) * turns[j] * intact[j] * inductance / dt),
+            dt_per_inductance: three!(|j| {
+                let there = zero.lt(turns[j]);
+                let value = turns[j] * (one - at(MotorParameter::ShortCoupling) * intact[j]) * inductance;
+                S::select(there, dt / S::select(there, value, one), zero)
+            }),
+            intact: three!(|j| intact[j] * (one - at(MotorParameter::ShortCoupling) * turns[j]) * inductance),
+        }
+    }
+}
+
+/// What a drive remembers of its legs and integrals, V.
+#[derive(Clone, Copy, Debug)]
+pub struct DrivenState<S> {
+    pub(super) legs: [S; 3],
+    pub(super) integral: [S; 2],
+}
+
+kept!(DrivenState<f64> as DrivenState { legs, integral });
+
+impl<S: Scalar> DrivenState<S> {
+    pub(super) fn initial() -> Self {
+        Self { legs: [S::zero(); 3], integral: [S::zero(); 2] }
+    }
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -1,10 +1,11 @@
 //! All signals of the reduced-order model from its state. Nothing here feeds back.
 
-use super::model::{Model, State, Structure};
+use super::model::{Model, State};
+use super::structure::Structure;
 use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::layout::COMMAND;
 use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_SPECIFIC};
-use crate::actuator::{Inputs, Signals};
+use crate::actuator::{Observation, Signals};
 use crate::scalar::{Kernel, Scalar};
 
 /// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
@@ -15,24 +16,11 @@ const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVolta
 const SENSORS: [Q; 4] = [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed, Q::ResolverSignal];
 const OF_SENSORS: Signals = Signals::of(&[SENSORS[0] as usize, SENSORS[1] as usize, SENSORS[2] as usize, SENSORS[3] as usize]);
 
-/// What is observed of a chunk. It depends on no form of servo, so that all forms share its code.
-pub(super) struct Observation<'a, S: Scalar> {
-    pub structure: &'a Structure,
-    pub model: &'a Model<S>,
-    pub inputs: &'a Inputs<S>,
-    pub state: &'a State<S>,
-    pub t: S,
-    pub selection: Signals,
-    /// With the signals of a screw.
-    pub linear: bool,
-    pub out: &'a mut [S],
-}
-
-impl<S: Scalar> Kernel for Observation<'_, S> {
+impl<S: Scalar> Kernel for Observation<'_, Structure, Model<S>, State<S>, S> {
     type Output = ();
     #[inline(always)]
     fn run(self) {
-        let Self { structure, model, inputs, state, t, selection, linear, out } = self;
+        let Self { structure, model, inputs, state, t, selection, out } = self;
         states(structure, model, state, out);
         if selection.any(Signals::of(&[Q::Command as usize])) {
             out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
@@ -44,7 +32,7 @@ impl<S: Scalar> Kernel for Observation<'_, S> {
             }
         }
         if selection.any(OF_INPUTS) || selection.any(OF_SHAFT) {
-            loaded(structure, model, &Instant::at(inputs, t), state, linear, out);
+            loaded(structure, model, &Instant::at(inputs, t), state, out);
         }
     }
 }
@@ -85,7 +73,7 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
 
 /// What inputs and loads decide.
 #[inline(always)]
-fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, linear: bool, out: &mut [S]) {
+fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) {
     let signals = m.shaft.observe(&structure.shaft, x, &s.shaft, s.motor_torque);
     let source = x.supply * m.drive.supply_scale;
     for (q, value) in [
@@ -99,7 +87,7 @@ fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &St
         out[q as usize] = value;
     }
     shared(LOW_SPECIFIC, signals.added.signals(), out);
-    if linear {
+    if structure.shaft.linear {
         let [position, speed, torque, efficiency, aiding] = m.shaft.observe_screw(&s.shaft, &signals);
         // Current and voltage of the printed L-R circuit.
         let root = S::splat(1.5_f64.sqrt());

@@ -3,16 +3,14 @@
 //! windings are stepped one by one through the switching model's bridge, exactly for voltages held over a part of the
 //! step. The diodes follow the EMFs as they turn, so that a step is cut into parts of a small electrical angle.
 
-use super::model::{Model, State, Structure};
-use super::phase::{coefficients, Phase};
+use super::model::{Model, Phase, State};
+use super::phase::coefficients;
+use super::structure::Structure;
+use super::windings::{parts, per_winding};
 use crate::inverter::bridge::{extinguish, Windings};
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
-
-/// Electrical angle over which EMFs are held, rad, and most parts of a step: beyond, a step is more than four turns.
-const LONGEST_TURN: f64 = 0.1;
-const MOST: f64 = 256.0;
 
 /// A step behind the bridge without gates.
 pub(super) struct Passive<S> {
@@ -35,19 +33,6 @@ struct Part<S> {
     resistance: [S; 3],
     /// (1 - exp(-R dt / L)) / R of each winding: exact for voltages held.
     per_winding: [S; 3],
-}
-
-/// Parts of a step in which EMFs are held.
-#[inline(always)]
-pub(super) fn parts<S: Scalar>(m: &Model<S>, speed: S) -> S {
-    let turned = (m.star.pole_pairs * speed * m.dt).abs();
-    -((turned * S::splat(-1.0 / LONGEST_TURN)).floor()).clamp(S::splat(-MOST), S::splat(-1.0))
-}
-
-/// (1 - exp(-R dt / L)) / R of each winding: its current per volt held over `dt`.
-#[inline(always)]
-pub(super) fn per_winding<S: Scalar>(m: &Model<S>, resistance: [S; 3], dt: S) -> [S; 3] {
-    three!(|j| (S::one() - (-(dt * resistance[j] / m.inductance[j])).exp()) / resistance[j])
 }
 
 /// The windings over a step from the phase currents `i`.

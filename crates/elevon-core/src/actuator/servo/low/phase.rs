@@ -1,53 +1,12 @@
 //! The equivalent phase at one rotor angle (docs/explanation/theory/low-fidelity.md, "From three phases to one").
 
-use super::control::Control;
-use super::model::{Model, State, Structure};
+use super::model::{Model, Phase, State};
+use super::structure::Structure;
 use crate::inverter::hysteresis::six_step;
 use crate::motor::equivalent::{equivalent, imposed_shape, quadrature, Circuit};
 use crate::scalar::{three_phase, Scalar};
 use crate::sensor::resolver::Reading;
 use crate::three;
-
-#[derive(Clone, Copy, Debug)]
-pub struct Phase<S> {
-    pub torque_constant: S,
-    pub circuit: Circuit<S>,
-    /// Torque per torque the controller believes in.
-    pub efficacy: S,
-    /// 1 / (J + efficacy K_p T_d): the derivative of the speed acts as inertia.
-    pub per_effective_inertia: S,
-    /// k_j of the phases, and the currents per ampere of the reference.
-    pub coefficients: [S; 3],
-    pub imposed: [S; 3],
-    /// Direct component of the EMF over the speed, in the frame of the references: none where they are well placed.
-    pub direct: S,
-    /// Angle and speed of the shaft by which the references are placed.
-    pub believed: [S; 2],
-    /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors report it.
-    pub quadrature: S,
-    pub seen: S,
-}
-
-impl<S: Scalar> Phase<S> {
-    #[inline(always)]
-    pub(super) fn new(torque_constant: S, circuit: Circuit<S>, control: &Control<S>, inertia: S) -> Self {
-        let efficacy = torque_constant * control.per_torque_constant;
-        let per_effective_inertia = S::one() / efficacy.fma(control.derivative_inertia, inertia);
-        let (zero, one) = ([S::zero(); 3], S::one());
-        Self {
-            torque_constant,
-            circuit,
-            efficacy,
-            per_effective_inertia,
-            coefficients: zero,
-            imposed: zero,
-            direct: S::zero(),
-            believed: [S::zero(); 2],
-            quadrature: one,
-            seen: one,
-        }
-    }
-}
 
 /// k_j at a motor position and the reference temperature.
 #[inline(always)]

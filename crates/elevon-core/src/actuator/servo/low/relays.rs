@@ -1,9 +1,9 @@
 //! What the relays leave between the current and its reference, for the one phase and for the three windings
 //! (docs/explanation/theory/low-fidelity.md, "Two drives", "The speed derivative as inertia").
 
-use super::driven::{settled, DrivenState, Part};
-use super::model::{Model, State, Structure};
-use super::phase::Phase;
+use super::model::{DrivenState, Model, Phase, State};
+use super::structure::Structure;
+use super::windings::{settled, Part};
 use crate::actuator::servo::shaft::Loads;
 use crate::inverter::hysteresis::six_step;
 use crate::motor::equivalent::quadrature;
@@ -171,7 +171,7 @@ impl<S: Scalar> Relays<S> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::driven::tests::part;
+    use super::super::windings::tests::part;
     use super::*;
 
     #[test]

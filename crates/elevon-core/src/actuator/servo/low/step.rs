@@ -3,10 +3,11 @@
 
 use super::control::{demand, integrate};
 use super::driven::driven_step;
-use super::model::{Model, State, Structure};
+use super::model::{Model, Phase, State};
 use super::passive::passive_step;
-use super::phase::{phase, Phase};
+use super::phase::phase;
 use super::relays::{mean_error, within_band, TorqueDemand};
+use super::structure::Structure;
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::ripple_square;

@@ -16,7 +16,7 @@ pub(super) use self::observe::ShaftSignals;
 pub(super) use self::train::TRAIN;
 use self::train::{Train, TrainDetails};
 use super::form::Form;
-use super::high::model::network_period;
+use super::heat::network_period;
 use super::layout::*;
 use crate::details;
 use crate::kept;
