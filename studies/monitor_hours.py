@@ -26,7 +26,7 @@ from studies.side_by_side import side_by_side
 
 if TYPE_CHECKING:
     from elevon.arrays import Floats
-    from elevon.bench.standard import StandardTest
+    from elevon.bench.procedure import StandardTest
     from elevon.diagnose.monitor import Monitor
     from elevon.diagnose.monitor.windows import Windows
     from elevon.logs.log import Log
@@ -165,8 +165,7 @@ def _of_actuator(name: str, days: int, seed: int) -> list[HealthyDay]:
 
 def _test(name: str) -> StandardTest:
     from elevon import Actuator
-    from elevon.bench.procedure import Procedure
-    from elevon.bench.standard import StandardTest, standard_tests
+    from elevon.bench.procedure import Procedure, StandardTest, standard_tests
 
     seconds, _, stand, steps = MOTIONS[name]
     if not steps:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elevon.bench.procedure import POSITION, StandardTest, standard_tests
 from elevon.bench.stand import stand_of
-from elevon.bench.standard import POSITION, StandardTest, standard_tests
 from elevon.errors import ElevonWarning
 from elevon.logs.log import Log
 from elevon.progress import part

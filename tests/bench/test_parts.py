@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from elevon.bench import micrometer
-from elevon.bench.converter import Hx711
+from elevon.bench import steps
+from elevon.bench.rig import Hx711
 from elevon.bench.spring import STANDARD_WIRES, SpringTask, design_spring, search_springs
 from elevon.errors import InputError
 
@@ -64,24 +64,24 @@ def test_micrometer_reproduces_the_printed_columns(shared):
         shared / "reference" / "tables" / "torino_backlash.csv", delimiter=",", skip_header=2
     )
     for _, d, mw, _, calculated, _, measured, _ in table:
-        assert micrometer.centre_distance(d) == pytest.approx(mw, abs=0.015)
-        assert micrometer.geometric_backlash(d) == pytest.approx(calculated, abs=1.5e-4)
-        assert micrometer.measured_backlash(d) == pytest.approx(measured, abs=1e-12)
+        assert steps.centre_distance(d) == pytest.approx(mw, abs=0.015)
+        assert steps.geometric_backlash(d) == pytest.approx(calculated, abs=1.5e-4)
+        assert steps.measured_backlash(d) == pytest.approx(measured, abs=1e-12)
 
 
 def test_micrometer_inverts():
     for curve in ("geometric", "measured"):
         for reading in np.linspace(9.0, 14.0, 21):
-            backlash = micrometer.total_backlash(reading, curve)
-            assert micrometer.micrometer_for(backlash, curve) == pytest.approx(reading, abs=1e-9)
-    assert micrometer.total_backlash(14.0) == micrometer.INTRINSIC_BACKLASH
+            backlash = steps.total_backlash(reading, curve)
+            assert steps.micrometer_for(backlash, curve) == pytest.approx(reading, abs=1e-9)
+    assert steps.total_backlash(14.0) == steps.INTRINSIC_BACKLASH
     for bad in (8.9, 14.1, math.nan):
         with pytest.raises(InputError):
-            micrometer.centre_distance(bad)
+            steps.centre_distance(bad)
     with pytest.raises(InputError, match="slide sets"):
-        micrometer.micrometer_for(0.2)
+        steps.micrometer_for(0.2)
     with pytest.raises(InputError, match="geometric"):
-        micrometer.total_backlash(14.0, "guess")
+        steps.total_backlash(14.0, "guess")
 
 
 def test_converter_counts_and_clips():

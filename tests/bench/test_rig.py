@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.bench.brake_rig import BrakeRig, CellState, brake_loop
-from elevon.bench.micrometer import INTRINSIC_BACKLASH
 from elevon.bench.procedure import Procedure, load_procedure, procedure_names
-from elevon.bench.rig import setups
+from elevon.bench.rig import BrakeRig, CellState, brake_loop, setups
 from elevon.bench.run import claim_bench, run_procedure
-from elevon.bench.state import finished_logs
+from elevon.bench.steps import INTRINSIC_BACKLASH
+from elevon.bench.traces import finished_logs
 from elevon.cli import main
 from elevon.documents import Document, validated
 from elevon.errors import InputError, Interrupted, OutputExistsError

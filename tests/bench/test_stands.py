@@ -7,7 +7,7 @@ import pytest
 
 from elevon import Actuator, Recording
 from elevon.bench.acquisition import acquire, internal_steps
-from elevon.bench.force_control import ForceLoop, target_force
+from elevon.bench.loaded import ForceLoop, target_force
 from elevon.bench.procedure import Procedure, load_procedure, procedure_names
 from elevon.bench.run import run_procedure, stand_setups
 from elevon.bench.stand import stand_names, stand_of, stands

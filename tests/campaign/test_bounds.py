@@ -6,7 +6,8 @@ import stat
 
 import pytest
 
-from elevon.campaign import limits, load_plan, resolve_plan
+from elevon.campaign import load_plan, resolve_plan
+from elevon.campaign.resolve import MOST_RUNS
 from elevon.cli import main
 from elevon.errors import FormatError, InputError
 
@@ -44,7 +45,7 @@ def test_counts_are_checked_before_anything_is_built(plan, cli, tail, words):
     code, _, err = cli("campaign", "plan", path)
     assert code == 2
     assert words in err
-    assert str(limits.MOST_RUNS) in err
+    assert str(MOST_RUNS) in err
 
 
 def test_many_seeds_times_many_values(plan, cli):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.campaign.describe import describe
+from elevon.campaign.card import describe
 from elevon.campaign.export import identifiers, run_numbers
 from elevon.cli import main
 from elevon.errors import InputError
@@ -146,8 +146,7 @@ def _other_split(folder):
     """Put one run of a draw into the other part, with every checksum right."""
     from elevon.campaign import read_manifest, read_resolved
     from elevon.campaign.block import write_table
-    from elevon.campaign.resolved_file import plan_hash
-    from elevon.campaign.runs_table import read_outcome, runs_table
+    from elevon.campaign.resolved_file import plan_hash, read_outcome, runs_table
     from elevon.worklog import digest
 
     resolved, manifest = read_resolved(folder), read_manifest(folder)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from elevon.campaign import load_plan, resolve_plan
+from elevon.campaign.design import power_rows
 from elevon.campaign.grammar import Power
-from elevon.campaign.power import power_rows
 from elevon.campaign.twolevel import (
     block_words,
     blocks_of,

@@ -196,7 +196,7 @@ def test_what_killed_writers_left_is_swept(plan, cli, tmp_path, monkeypatch):
 
 
 def test_resuming_counts_the_disk_of_what_is_missing_only(plan, cli, tmp_path, monkeypatch):
-    from elevon.campaign import estimate as estimate_module
+    from elevon.campaign import check as estimate_module
 
     path, out = plan(), tmp_path / "out"
     with monkeypatch.context() as patch:

@@ -10,7 +10,7 @@ from threading import Thread
 
 import pytest
 
-from elevon.campaign.scheduler import LIMIT, check_scheduler
+from elevon.campaign.cluster import LIMIT, check_scheduler
 from elevon.errors import InputError
 
 

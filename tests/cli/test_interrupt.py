@@ -9,7 +9,7 @@ import weakref
 
 import pytest
 
-from elevon.bench.state import finished_logs
+from elevon.bench.traces import finished_logs
 from elevon.cli import interrupt, main
 from elevon.errors import OutputExistsError
 from elevon.files import journal, write_text

@@ -11,8 +11,7 @@ from elevon.diagnose.monitor import Monitor
 from elevon.diagnose.monitor.by_command import ActionCutter
 from elevon.diagnose.monitor.repetition import period_of
 from elevon.errors import InputError
-from elevon.live.trace import LiveMotion
-from elevon.live.watching import StreamWatch
+from elevon.live.trace import LiveMotion, StreamWatch
 from elevon.logs.log import Log
 
 pytestmark = pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")

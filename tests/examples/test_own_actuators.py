@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from elevon import Actuator
-from elevon.bench.scaled import scaled_procedure
+from elevon.bench.procedure import scaled_procedure
 from elevon.cli import main
 from elevon.parameters import load_set
 

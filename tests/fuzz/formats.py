@@ -269,7 +269,7 @@ def _manifest() -> tuple[Path, dict[str, Any]]:
 
 def _write_manifest(folder: Path, rng: np.random.Generator) -> Path:
     """Half of the manifests carry a checksum that fits: what is behind it must hold, too."""
-    from elevon.campaign.seal import seal
+    from elevon.campaign.store import seal
 
     source, content = _manifest()
     for item in source.iterdir():

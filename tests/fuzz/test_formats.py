@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from elevon.campaign.manifest_shape import shape_error
-from elevon.campaign.store import Manifest
+from elevon.campaign.store import Manifest, shape_error
 from elevon.errors import FormatError, InputError
 from tests.fuzz.formats import FORMATS
 from tests.fuzz.mutate import Raw, changed, to_json, to_toml

@@ -7,9 +7,8 @@ import pytest
 from elevon import Actuator
 from elevon.live.bench import LiveBench
 from elevon.live.health import Examiner, Health, Request
-from elevon.live.trace import LiveMotion, write_stretch
+from elevon.live.trace import LiveMotion, Watch, window_of, write_stretch
 from elevon.live.unit import LiveUnit
-from elevon.live.watching import Watch, window_of
 from tests.live.serving import SINE
 
 FAULT = "backlash@transmission"

@@ -9,8 +9,8 @@ from elevon import Actuator
 from elevon.cli.live import _bench
 from elevon.errors import InputError
 from elevon.live import replay
+from elevon.live.app import Guard
 from elevon.live.bench import LiveBench
-from elevon.live.guard import Guard
 from elevon.live.health import Examiner, Health, Request
 from elevon.live.replay import LogReplay
 from elevon.live.unit import LiveUnit

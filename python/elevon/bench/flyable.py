@@ -17,8 +17,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired
-from elevon.bench.force_control import ForceLoop
-from elevon.bench.loaded import waveform_values, write_loaded
+from elevon.bench.loaded import ForceLoop, waveform_values, write_loaded
 from elevon.bench.stand import Stand, stand_of
 from elevon.errors import InputError, SimulationError
 from elevon.faults import Fault

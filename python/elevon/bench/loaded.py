@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired
-from elevon.bench.force_control import ForceLoop, target_force
 from elevon.bench.procedure import Procedure
-from elevon.bench.rating import SHARE, holds, rated_factor
 from elevon.bench.rig import BenchSetup, Conditions, draw_conditions, moved, moved_command
-from elevon.bench.stand import Stand
+from elevon.bench.stand import ForceSpec, Stand
 from elevon.bench.steps import ForceStep, RigStep, SensorStep, SettingsStep, TraceStep
 from elevon.errors import DivergedError, InputError, unknown
 from elevon.faults import Fault
@@ -28,6 +27,119 @@ from elevon.scenario import Scenario
 from elevon.scenario.scenario import Term
 from elevon.simulate import Run, simulate, simulate_batch, solver_step
 from elevon.units import parse_quantity
+
+if TYPE_CHECKING:
+    from elevon.actuator import Actuator
+    from elevon.arrays import Floats
+
+
+#: Of what the drive holds at its current limit. ASSUMED: the rest accelerates and overcomes
+#: friction, and a continuous thrust is about half of the peak.
+SHARE = 0.5
+_LIMITS = ("control.current_limit", "control.torque_constant", "gear.ratio", "screw.lead")
+
+
+def holds(actuator: Actuator) -> float:
+    """Return the thrust at the current limit without losses [N]; infinite where no limit is known.
+
+    The screw's lead is in m/rad.
+    """
+    known = actuator.parameters
+    if any(path not in known for path in _LIMITS):
+        return float("inf")
+    current, constant, ratio, lead = (known.value(path) for path in _LIMITS)
+    return float(current * constant * ratio / lead)
+
+
+def rated_factor(step: ForceStep, terms: Floats, command: Floats, most: float) -> float:
+    """Return by what the forces of a step are multiplied so that they stay within `most`.
+
+    Parameters
+    ----------
+    step : ForceStep
+        What the procedure asks for.
+    terms, command : ndarray, shape (n,)
+        Its waveforms [N], the commanded positions [m].
+    most : float
+        N.
+    """
+    spring = parse_quantity(step.stiffness, "N/m", "stiffness") * command
+    if step.positions:
+        spring = spring + np.interp(command, step.positions, step.forces)
+    against = abs(parse_quantity(step.opposing, "N", "opposing"))
+    largest = float(np.max(np.abs(terms + spring))) + against
+    return min(1.0, most / largest) if largest > 0.0 else 1.0
+
+
+_AT_REST = 1e-3  # m/s below which a direction fades: rest has none
+
+
+@dataclass(frozen=True, slots=True)
+class ForceLoop:
+    """The loop in SI; see `elevon.bench.stand.ForceSpec`."""
+
+    limit: float
+    omega: float
+    damping: float
+    friction: float
+    mass: float
+
+    @classmethod
+    def of(cls, spec: ForceSpec) -> ForceLoop:
+        """Return the loop a stand's file describes."""
+        return cls(
+            parse_quantity(spec.limit, "N", "force.limit"),
+            2.0 * math.pi * parse_quantity(spec.bandwidth, "Hz", "force.bandwidth"),
+            spec.damping,
+            parse_quantity(spec.friction, "N", "force.friction"),
+            parse_quantity(spec.mass, "kg", "force.mass"),
+        )
+
+    def achieved(self, time: Floats, target: Floats, speed: Floats) -> Floats:
+        """Return the force on the rod [N] for a commanded force and the rod's speed.
+
+        Raises
+        ------
+        InputError
+            More is commanded than the load actuator has.
+        """
+        most = float(np.abs(target).max())
+        if most > self.limit:
+            raise InputError(f"force of {most:.5g} N: the load actuator has {self.limit:.5g} N")
+        period = float(time[1] - time[0])
+        acceleration = np.gradient(speed, period)
+        other = self.friction * np.tanh(speed / _AT_REST) + self.mass * acceleration
+        return self._closed(target, period) + other - self._closed(other, period)
+
+    def _closed(self, values: Floats, period: float) -> Floats:
+        """Return what the closed loop makes of a signal that was steady before."""
+        from scipy.signal import bilinear, lfilter, lfilter_zi
+
+        w = self.omega
+        numerator, denominator = bilinear([w**2], [1.0, 2.0 * self.damping * w, w**2], 1.0 / period)
+        state = lfilter_zi(numerator, denominator) * values[0]
+        return np.asarray(lfilter(numerator, denominator, values, zi=state)[0], dtype=np.float64)
+
+
+def target_force(step: ForceStep, terms: Floats, position: Floats, speed: Floats) -> Floats:
+    """Return the commanded force [N]: of time, direction and position.
+
+    Parameters
+    ----------
+    step : ForceStep
+        What the operator set.
+    terms : ndarray, shape (n,)
+        Values of its terms.
+    position, speed : ndarray, shape (n,)
+        Of the output [m], [m/s].
+    """
+    against: Any = parse_quantity(step.opposing, "N", "opposing")
+    spring = parse_quantity(step.stiffness, "N/m", "stiffness")
+    total = terms + against * np.tanh(speed / _AT_REST) + spring * position
+    if step.positions:
+        total = total + np.interp(position, step.positions, step.forces)
+    return np.asarray(total, dtype=np.float64)
+
 
 _GRID = 1e-3  # s of the force table
 _FINE = 0.25  # of it between two samples of the motion

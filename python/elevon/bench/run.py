@@ -15,8 +15,7 @@ from elevon.bench.loaded import LoadedSetup, loaded_setups, run_loaded, write_lo
 from elevon.bench.procedure import Procedure, procedure_names
 from elevon.bench.rig import Setup, setups
 from elevon.bench.stand import stand_of
-from elevon.bench.state import claim_logs, ending_of
-from elevon.bench.traces import recorded, write_traces
+from elevon.bench.traces import claim_logs, ending_of, recorded, write_traces
 from elevon.errors import InputError, Interrupted
 from elevon.faults import Fault
 from elevon.files import check_output, write_text

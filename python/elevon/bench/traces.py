@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,72 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.bench.converter import Hx711
-from elevon.bench.rig import RATE, Setup
-from elevon.files import write_text
+from elevon.bench.rig import RATE, Hx711, Setup
+from elevon.errors import FormatError, InputError, OutputExistsError
+from elevon.files import check_output, write_text
 from elevon.logs.command.guess import FREE
 from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import write_loadcell
 from elevon.parameters.records import wirings
 from elevon.recording import Recording
+from elevon.recording.csv import description_path
 from elevon.units import format_quantity, parse_quantity
+from elevon.worklog import Item, WorkLog
+
+
+def claim_logs(path: Path, key: str, names: Iterable[str], *, force: bool) -> tuple[WorkLog, bool]:
+    """Make a folder this work's own, or find the same work begun there.
+
+    Returns
+    -------
+    WorkLog, bool
+        ``bench-NAME.log``, a line for each finished log; whether the very same work was there.
+
+    Raises
+    ------
+    InputError
+        The folder is a file.
+    OutputExistsError
+        Without `force`: the folder holds logs of other work, or logs that nobody knows.
+    """
+    folder = path.parent
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder")
+    if force:
+        return WorkLog.begin(path, key), False
+    try:
+        old = WorkLog.read(path)
+    except FormatError as error:
+        raise OutputExistsError(f"{path}: cannot be read ({error}); use force (--force)") from error
+    if old is not None and old.key == key:
+        return old, True
+    if old is not None:
+        raise OutputExistsError(
+            f"{path}: belongs to other work; use force (--force) to replace them"
+        )
+    for name in names:
+        traces = trace_files(folder, name, cell=True)
+        for file in (*traces, description_path(traces[-1])):
+            check_output(file)
+    return WorkLog.begin(path, key), False
+
+
+def finished_logs(path: Path) -> list[str]:
+    """Return the names of the logs that a state file calls finished; none where there is none."""
+    try:
+        log = WorkLog.read(path)
+    except FormatError:
+        return []
+    return [] if log is None else [name for name, item in log.items.items() if ending_of(item)]
+
+
+def ending_of(item: Item) -> tuple[str, str] | None:
+    """Return status (``ok`` or ``tripped``) and message of a finished log; None: it says none."""
+    status, message = item.data.get("status"), item.data.get("message")
+    if item.files and isinstance(status, str) and isinstance(message, str):
+        return status, message
+    return None
+
 
 _LOGGED = {
     "encoder_position": "encoder_position",

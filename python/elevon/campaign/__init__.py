@@ -2,7 +2,7 @@
 
 from elevon.campaign.dataset import Dataset, Table, load_campaign, load_run
 from elevon.campaign.execute import CampaignResult, resume_campaign, run_campaign
-from elevon.campaign.plan import Plan, load_plan
+from elevon.campaign.grammar import Plan, load_plan
 from elevon.campaign.resolve import resolve_plan
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import read_resolved

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import os
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from elevon.campaign.part import Part
-from elevon.campaign.resolved_file import read_resolved
-from elevon.campaign.runs_table import RUNS
+from elevon.campaign.ends import last_values
+from elevon.campaign.resolved import Resolved
+from elevon.campaign.resolved_file import RUNS, read_resolved
 from elevon.campaign.store import Manifest, read_manifest, repair_hint, work_log
 from elevon.errors import FormatError, InputError, unknown
+from elevon.recording import Channel, Clock, Recording
 from elevon.recording.contents import warn_of_old_names
 from elevon.retired import current
+from elevon.simulate.result import FaultLabel, fault_labels
 from elevon.transaction import located
-from elevon.worklog import Item
+from elevon.worklog import Item, digest
 
 if TYPE_CHECKING:
     import duckdb
@@ -29,6 +32,100 @@ if TYPE_CHECKING:
 
     from elevon.campaign.resolved import Resolved
     from elevon.recording import Recording
+
+
+@dataclass(frozen=True)
+class Part:
+    """One file of a table: its runs, what it must be (size, SHA-256) if known, what mends it."""
+
+    path: Path
+    first: int
+    last: int
+    about: Mapping[str, Any] | None
+    remedy: str = ""
+
+    def check(self) -> None:
+        """Raise `FormatError` unless the file is as it was written."""
+        try:
+            stat = self.path.stat()
+        except OSError as error:
+            raise FormatError(
+                f"{self.path}: cannot be read: {error.strerror}{self.remedy}"
+            ) from error
+        if self.about is not None and _mark(self.path, stat.st_mtime_ns) != self.about["sha256"]:
+            raise FormatError(f"{self.path}: is not as it was written (SHA-256){self.remedy}")
+
+
+@lru_cache(maxsize=4096)
+def _mark(path: Path, stamp: int) -> str:  # noqa: ARG001 - a changed file is read anew
+    return str(digest(path)["sha256"])
+
+
+def recorded(ds: Dataset, number: int) -> Recording:
+    """Return one run of a data set; see `elevon.campaign.load_run`."""
+    _check_done(ds, number)
+    resolved = ds.resolved()
+    prepared = resolved.prepared(number)
+    labels = fault_labels(prepared)
+    channels: list[Channel] = []
+    clocks: list[Clock] = []
+    for place, plan in enumerate(prepared.plan):
+        frame = ds.clock(plan.name).to_arrow(runs=[number])
+        clock = Clock(plan.name, frame["time"].to_numpy(), plan.rate)
+        about = {f.name: f.metadata for f in frame.schema}
+        clocks.append(clock)
+        for name in plan.signals:
+            unit, text = (about[name][key].decode() for key in (b"unit", b"text"))
+            channels.append(Channel(name, unit, frame[name].to_numpy(), clock, text))
+        if place == 0:
+            channels.extend(_severities(labels, frame, clock))
+    meta = _meta(ds, resolved, number)
+    ends = ds.ends
+    rows = [] if ends is None else ends.to_arrow(runs=[number]).to_pylist()
+    final = last_values(rows[0]) if rows else {}
+    return Recording(channels, clocks=clocks, meta=meta, labels=labels, final=final)
+
+
+def _severities(labels: Sequence[FaultLabel], frame: Any, clock: Clock) -> list[Channel]:
+    channels = []
+    for label in labels:
+        name = f"{label['kind']}@{label['place']}"
+        values, text = frame[name].to_numpy(), f"severity of {name}"
+        channels.append(Channel(label["channel"], label["unit"], values, clock, text))
+    return channels
+
+
+def _check_done(ds: Dataset, number: int) -> None:
+    spans = [(item.data["first"], item.data["last"]) for item in ds.items]
+    if not any(first <= number <= last for first, last in spans):
+        done = sum(last - first + 1 for first, last in spans)
+        raise InputError(
+            f"{ds.folder}: run {number} is not there; {done} of {len(ds)} runs are done"
+        )
+
+
+def _meta(ds: Dataset, resolved: Resolved, number: int) -> dict[str, Any]:
+    run = resolved.run(number)
+    row = ds.runs.to_arrow(runs=[number]).to_pylist()[0]
+    return {
+        "status": row["status"],
+        "message": row["reason"],
+        "run": number,
+        "label": run.label,
+        "split": row["split"],
+        "values": resolved.values(number),
+        "actuator": run.actuator.name,
+        "wiring": resolved.wiring,
+        "fidelity": resolved.fidelity,
+        "seed": run.seed,
+        "number": number,
+        "parameter_hash": run.actuator.hash,
+        "version": ds.manifest.version,
+        "sim_s": row["sim_s"],
+        "steps": row["steps"],
+        "faults": [str(fault) for fault in run.scenario.fault],
+        "scenario": run.scenario.to_dict(),
+    }
 
 
 @dataclass(frozen=True)
@@ -300,8 +397,6 @@ class Dataset:
 
     def recording(self, number: int) -> Recording:
         """Return one run as a recording; errors as `elevon.campaign.load_run`."""
-        from elevon.campaign.load import recorded
-
         return recorded(self, number)
 
     def _table(self, place: str, clock: str) -> Table:

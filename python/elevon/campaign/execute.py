@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from elevon.campaign.block import check_there, finish_block, simulate_block
-from elevon.campaign.check import check
-from elevon.campaign.describe import counted
-from elevon.campaign.estimate import Cost, estimate
+from elevon.campaign.card import counted
+from elevon.campaign.check import Cost, check, estimate
 from elevon.campaign.folder import CampaignWork, begin, finish, finished, open_folder
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import read_resolved

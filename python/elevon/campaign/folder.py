@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import itertools
+import json
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from elevon.campaign.block import block_name, signal_schema, write_rows
 from elevon.campaign.card import card_texts
+from elevon.campaign.check import Cost, check_disk
 from elevon.campaign.dataset import Dataset
-from elevon.campaign.described import described_item, read_description
 from elevon.campaign.ends import ENDS, read_ends
-from elevon.campaign.estimate import Cost, check_disk
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.resolved_file import plan_hash, resolved_text
-from elevon.campaign.runs_table import RUNS, planned, read_outcome, runs_table, with_copy
+from elevon.campaign.resolved_file import (
+    LONGEST,
+    RUNS,
+    plan_hash,
+    planned,
+    read_outcome,
+    resolved_text,
+    runs_table,
+    with_copy,
+)
 from elevon.campaign.split import split_index
 from elevon.campaign.store import (
     LOG,
@@ -26,6 +34,8 @@ from elevon.campaign.store import (
     RESOLVED,
     Manifest,
     core_hash,
+    described_item,
+    read_description,
     read_manifest,
     repair_hint,
     work_log,
@@ -35,6 +45,42 @@ from elevon.files import read_regular, write_text
 from elevon.record_plan import ClockPlan
 from elevon.transaction import Transaction, is_staged, settle
 from elevon.worklog import LOCK, Item, WorkLog, digest
+
+_MOST = 3
+
+
+def difference(folder: Path, resolved: Resolved) -> str:
+    """Return the first differences between a plan and the one a folder holds."""
+    try:
+        old = json.loads(read_regular(folder / RESOLVED, LONGEST))
+    except (OSError, ValueError):
+        return "its resolved plan cannot be read"
+    new = json.loads(resolved_text(resolved))
+    places = list(_places(old, new, ""))
+    changed = [
+        f"the points of {name} have changed"
+        for name, mark in new["sources"].items()
+        if old.get("sources", {}).get(name, mark) != mark
+    ]
+    places = [place for place in places if not place.startswith("sources")]
+    if not changed and not places:
+        return "the drawn values differ"
+    return "; ".join([*changed, *(f"{place} differs" for place in places)][:_MOST])
+
+
+def _places(old: Any, new: Any, place: str) -> Iterator[str]:
+    """Yield the places at which two JSON values differ."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        for key in dict.fromkeys([*old, *new]):
+            inner = f"{place}.{key}" if place else str(key)
+            yield from _places(old.get(key), new.get(key), inner)
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for index, (first, second) in enumerate(zip(old, new, strict=True)):
+            named = first.get("path", index) if isinstance(first, Mapping) else index
+            yield from _places(first, second, f"{place}[{named}]")
+    elif old != new:
+        yield place
+
 
 _LONGEST = 2**30
 
@@ -317,8 +363,6 @@ def _is_plan(path: Path, text: str) -> bool:
 
 def _check_same(folder: Path, manifest: Manifest, resolved: Resolved) -> None:
     """Refuse another plan than the one a campaign was begun with."""
-    from elevon.campaign.difference import difference
-
     if manifest.plan_hash != plan_hash(resolved):
         raise InputError(
             f"{folder}: holds another campaign ({manifest.name}, {manifest.total} runs): "

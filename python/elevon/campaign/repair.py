@@ -17,9 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from elevon.campaign.block import block_name
-from elevon.campaign.check import borders, check
-from elevon.campaign.described import described_blocks
-from elevon.campaign.estimate import Cost
+from elevon.campaign.check import Cost, borders, check
 from elevon.campaign.folder import (
     CampaignWork,
     describe_anew,
@@ -30,11 +28,18 @@ from elevon.campaign.folder import (
     whole_blocks,
 )
 from elevon.campaign.resolved import Resolved
-from elevon.campaign.resolved_file import LONGEST, plan_hash, rebuilt
-from elevon.campaign.runs_table import RUNS, planned, read_table
-from elevon.campaign.seal import unpacked
+from elevon.campaign.resolved_file import LONGEST, RUNS, plan_hash, planned, read_table, rebuilt
 from elevon.campaign.split import split_index
-from elevon.campaign.store import LOG, MANIFEST, PLAN, RESOLVED, Manifest, read_manifest
+from elevon.campaign.store import (
+    LOG,
+    MANIFEST,
+    PLAN,
+    RESOLVED,
+    Manifest,
+    described_blocks,
+    read_manifest,
+    unpacked,
+)
 from elevon.errors import ElevonError, FormatError, InputError
 from elevon.files import read_regular
 from elevon.transaction import Transaction, settle
@@ -164,7 +169,7 @@ def _candidates(survey: _Survey) -> Iterator[Resolved]:
 
 
 def _resolved_anew(folder: Path, text: str) -> Resolved:
-    from elevon.campaign.plan import checked_plan
+    from elevon.campaign.grammar import checked_plan
     from elevon.campaign.resolve import resolve_plan
     from elevon.documents import Document
 

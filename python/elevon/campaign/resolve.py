@@ -3,27 +3,206 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.campaign.design import Points, design_points
-from elevon.campaign.draw import axis_values, column_of, random_values
-from elevon.campaign.embed import Embedder
-from elevon.campaign.grammar import Axis, Target
-from elevon.campaign.limits import check_counts
-from elevon.campaign.plan import Plan
-from elevon.campaign.population import Units, units_of
-from elevon.campaign.resolved import CaseChanges, Index, Resolved
+from elevon.campaign.draw import axis_values, column_of, random_values, ranged
+from elevon.campaign.grammar import Axis, Growth, Plan, Population, Spread, Target
+from elevon.campaign.resolved import CaseChanges, Embedder, Index, Resolved
 from elevon.campaign.split import split_index
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
 from elevon.faults import Fault
+from elevon.parameters.records import record_of
 from elevon.scenario import Scenario
 from elevon.scenario.scenario import check_units, with_texts
+from elevon.units import parse_quantity
+
+#: Runs of a plan. ASSUMED: the table of ten million runs takes some 2 GB while a plan is resolved;
+#: a larger experiment is split into several plans.
+MOST_RUNS = 10_000_000
+#: Axes of the product of all that varies: NumPy's arrays have 64 dimensions at most.
+_MOST_AXES = 60
+#: Kinds of a design whose points are all combinations of the factors' levels.
+_ALL_LEVELS = {"full_factorial"}
+
+
+def check_counts(plan: Plan, place: str) -> int:
+    """Return an upper bound of the number of runs.
+
+    Raises
+    ------
+    InputError
+        More than `MOST_RUNS`, or one number alone is; it is named. More axes than arrays have.
+    """
+    if len(plan.vary) > _MOST_AXES:
+        raise InputError(f"{place}: {len(plan.vary)} axes in 'vary'; the limit is {_MOST_AXES}")
+    counts = dict(_counts(plan))
+    total = math.prod(counts.values())
+    if total > MOST_RUNS:
+        listed = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)
+        raise InputError(f"{place}: {listed} = {total} runs; the limit is {MOST_RUNS}")
+    return total
+
+
+def _counts(plan: Plan) -> dict[str, int]:
+    counts = {"seeds": max(len(plan.seeds), 1), "cases": max(len(plan.case or ()), 1)}
+    if plan.population is not None:
+        counts["units"] = plan.population.units
+        counts["ages"] = len(plan.population.ages or ()) or plan.population.points or 1
+    for k, axis in enumerate(plan.vary):
+        counts[f"values of vary[{k}]"] = len(axis.values or ()) or axis.count or 1
+    if plan.random is not None:
+        counts["random draws"] = max(plan.random.count, 1)
+    if plan.design is not None:
+        counts["points of the design"] = _points(plan.design)
+    return counts
+
+
+def _points(design: Any) -> int:
+    """Return an upper bound of a design's points, replicates and centre points among them."""
+    if design.kind in _ALL_LEVELS:
+        points = math.prod(_levels(factor) for factor in design.factor)
+    else:
+        points = design.runs or design.count or 1
+    return int(points * design.replicates + design.centre * design.blocks)
+
+
+def _levels(factor: Any) -> int:
+    return len(factor.values or ()) or 2
+
+
+@dataclass(frozen=True)
+class Units:
+    """Every unit at every age, the ages of one unit following each other.
+
+    Attributes
+    ----------
+    targets, columns : list
+        What differs, with unit and values, shape (units * ages,).
+    unit, age : ndarray, shape (units * ages,)
+        Number and age (0 to 1).
+    """
+
+    targets: list[Target]
+    columns: list[tuple[str, Any]]
+    unit: npt.NDArray[np.int64]
+    age: Floats
+
+
+def units_of(population: Population, actuator: Actuator, place: str) -> Units:
+    """Return the units of a population.
+
+    Raises
+    ------
+    InputError
+        An unknown name, a wrong unit, a choice that has no spread; the place is named.
+    """
+    ages = _ages(population)
+    count = population.units
+    unit, age = np.repeat(np.arange(count), len(ages)), np.tile(ages, count)
+    # Each quantity has a generator of its own: one more leaves the others as they are.
+    seeds = np.random.SeedSequence(population.seed).spawn(
+        len(population.spread) + len(population.growth)
+    )
+    targets: list[Target] = [*population.spread, *population.growth]
+    columns: list[tuple[str, Any]] = []
+    for k, spread in enumerate(population.spread):
+        generator = np.random.default_rng(seeds[k])
+        unit_text, values = _spread(spread, actuator, count, generator, f"{place}.spread[{k}]")
+        columns.append((unit_text, values[unit]))
+    for k, growth in enumerate(population.growth):
+        generator = np.random.default_rng(seeds[len(population.spread) + k])
+        columns.append(
+            _grown(growth, actuator.wiring, (unit, age), generator, f"{place}.growth[{k}]")
+        )
+    return Units(targets, columns, unit, age)
+
+
+def _ages(population: Population) -> Floats:
+    if population.ages:
+        return np.array(population.ages, dtype=np.float64)
+    points = population.points or 1
+    return np.linspace(0.0, 1.0, points) if points > 1 else np.zeros(1)
+
+
+def _spread(
+    spread: Spread, actuator: Actuator, count: int, generator: np.random.Generator, place: str
+) -> tuple[str, Floats]:
+    """Return the values of one parameter of all units."""
+    path = str(spread.parameter)
+    record = record_of(actuator.wiring, path, place)
+    if record.choices is not None:
+        raise InputError(f"{place}: {path} is a choice: it has no spread")
+    if spread.distribution == "uniform":
+        return ranged(spread, generator.random(count), actuator.wiring, place)
+    nominal = actuator.parameters.value(path)
+    sd, relative = _deviation(spread, record.unit, place)
+    normal = _cut_normal(generator.random(count), float(spread.cut))
+    if spread.distribution == "lognormal":
+        if not relative:
+            raise InputError(f"{place}: the 'sd' of a lognormal spread is a fraction: '3 %'")
+        return record.unit, nominal * np.exp(sd * normal)
+    return record.unit, nominal + (nominal * sd if relative else sd) * normal
+
+
+def _deviation(spread: Spread, unit: str, place: str) -> tuple[float, bool]:
+    """Return the standard deviation, and whether it is a fraction of the value."""
+    text = spread.sd
+    if isinstance(text, str) and text.strip().endswith("%"):
+        sd, relative = parse_quantity(text, "1", f"{place}: sd"), True
+    else:
+        sd, relative = parse_quantity(text or 0.0, unit or "1", f"{place}: sd"), False
+    if sd <= 0.0:
+        raise InputError(f"{place}: sd = {text} must be positive")
+    return sd, relative
+
+
+def _cut_normal(uniform: Floats, cut: float) -> Floats:
+    """Return standard normal values cut at so many standard deviations, from uniform ones."""
+    from scipy.special import ndtr, ndtri
+
+    low, high = ndtr(-cut), ndtr(cut)
+    values: Floats = ndtri(low + (high - low) * uniform)
+    return values
+
+
+def _grown(
+    growth: Growth,
+    wiring: str,
+    where: tuple[npt.NDArray[np.int64], Floats],
+    generator: np.random.Generator,
+    place: str,
+) -> tuple[str, Floats]:
+    """Return the severity or value at every age of every unit."""
+    unit, age = where
+    text, ends = ranged(growth, np.array([0.0, 1.0]), wiring, place)
+    count = int(unit.max()) + 1
+    onset = growth.onset[0] + (growth.onset[1] - growth.onset[0]) * generator.random(count)
+    factor = np.exp(growth.spread * _cut_normal(generator.random(count), 3.0))
+    grows = generator.random(count) < growth.probability
+    fraction = np.clip((age - onset[unit]) / (1.0 - onset[unit]), 0.0, 1.0)
+    size = np.where(grows, (ends[1] - ends[0]) * factor, 0.0)
+    return text, ends[0] + size[unit] * _law(growth, fraction)
+
+
+def _law(growth: Growth, fraction: Floats) -> Floats:
+    if growth.law == "linear":
+        return fraction
+    if growth.law == "power":
+        return fraction ** float(growth.exponent)
+    rate = float(growth.exponent)
+    grown: Floats = np.expm1(rate * fraction) / np.expm1(rate)
+    return grown
+
 
 Quantity = tuple[Target, str, Any]
 

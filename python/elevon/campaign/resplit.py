@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from elevon.campaign.folder import describe_anew, stage_tables
-from elevon.campaign.resolved_file import LONGEST, read_resolved
-from elevon.campaign.runs_table import RUNS, read_outcome
+from elevon.campaign.resolved_file import LONGEST, RUNS, read_outcome, read_resolved
 from elevon.campaign.split import split_index
 from elevon.campaign.store import PLAN, read_manifest
 from elevon.errors import InputError

@@ -2,20 +2,104 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import json
 import os
+import zlib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Annotated, Any
 
-from elevon.campaign.manifest_shape import shape_error
-from elevon.campaign.seal import seal
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from elevon.campaign.ends import ENDS, read_ends
 from elevon.errors import FormatError, InputError
 from elevon.files import read_regular, write_text
 from elevon.retired import mapped
-from elevon.worklog import WorkLog
+from elevon.worklog import Item, WorkLog, digest
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+
+def _below(name: str) -> str:
+    """Refuse a file's name that leads out of the folder."""
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or "\0" in name or not path.parts:
+        raise ValueError("does not name a file below the folder")
+    return name
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow")
+
+    bytes: int = Field(ge=0)
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
+
+
+_Name = Annotated[str, Field(max_length=200), AfterValidator(_below)]
+_Files = dict[_Name, _File]
+
+
+class _Block(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow")
+
+    name: str
+    first: int = Field(ge=0)
+    last: int = Field(ge=0)
+    files: _Files
+
+
+class _Named(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow")
+
+    name: str
+
+
+#: Fields whose type says less than what readers rely on.
+_CLOSER: Mapping[str, Any] = {
+    "total": Annotated[int, Field(ge=0)],
+    "files": _Files,
+    "blocks": list[_Block],
+    "clocks": list[_Named],
+    "faults": list[_Named],
+    "columns": list[_Named],
+}
+
+
+def shape_error(kind: type, content: Mapping[str, object]) -> str | None:
+    """Return what is wrong with a manifest's fields, in one line; None where nothing is.
+
+    Parameters
+    ----------
+    kind : type
+        The dataclass whose fields they are.
+    content : mapping
+        Field to value.
+    """
+    for name, adapter in _adapters(kind).items():
+        try:
+            adapter.validate_python(content[name], strict=True)
+        except ValidationError as error:
+            first = error.errors(include_url=False, include_input=False)[0]
+            place = ".".join(str(part)[:60] for part in (name, *first["loc"]))
+            return f"{place}: {first['msg']}"
+    return None
+
+
+@lru_cache(maxsize=2)
+def _adapters(kind: type) -> dict[str, TypeAdapter[Any]]:
+    from typing import get_type_hints
+
+    from pydantic import TypeAdapter
+
+    return {
+        name: TypeAdapter(_CLOSER.get(name, hint)) for name, hint in get_type_hints(kind).items()
+    }
+
 
 SCHEMA = 3
 """Version of the folder's form, apart from the package's."""
@@ -169,3 +253,118 @@ def core_hash() -> str:
     from elevon import _core
 
     return hashlib.sha256(Path(str(_core.__file__)).read_bytes()).hexdigest()
+
+
+_LARGEST = 256 * 2**20
+"""Bytes that a packed text may expand to."""
+
+
+def seal(content: Mapping[str, object]) -> str:
+    """Return the SHA-256 of JSON content, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def packed(content: Mapping[str, object]) -> str:
+    """Return JSON content as one compressed text with its checksum."""
+    text = json.dumps({"check": seal(content), "content": content}, sort_keys=True)
+    return base64.b85encode(zlib.compress(text.encode(), 9)).decode("ascii")
+
+
+def unpacked(text: bytes | str | None) -> dict[str, Any] | None:
+    """Return the content of a packed text; None where it is not as it was written."""
+    if text is None:
+        return None
+    try:
+        stream = zlib.decompressobj()
+        raw = stream.decompress(base64.b85decode(text), _LARGEST)
+        whole = json.loads(raw)
+        content, mark = whole["content"], whole["check"]
+    except (ValueError, KeyError, TypeError, RecursionError, zlib.error):
+        return None
+    return content if isinstance(content, dict) and seal(content) == mark else None
+
+
+KEY = b"elevon"
+
+
+def block_description(
+    mark: str, name: str, span: tuple[int, int], files: Mapping[str, object]
+) -> dict[str, str]:
+    """Return the metadata of a block's table of ends, which is written after its other files.
+
+    Parameters
+    ----------
+    mark : str
+        The plan's hash.
+    name : str
+        Of the block.
+    span : tuple of int
+        First and last run.
+    files : mapping
+        Its other files, with size and SHA-256.
+    """
+    from elevon import _core
+
+    about = {
+        "schema": SCHEMA,
+        "plan_hash": mark,
+        "name": name,
+        "first": span[0],
+        "last": span[1],
+        "version": _core.version(),
+        "core": core_hash(),
+        "files": dict(files),
+    }
+    return {KEY.decode(): packed(about)}
+
+
+def read_description(path: Path) -> dict[str, object] | None:
+    """Return what a block's table of ends says of the block; None where it is not whole."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return unpacked((pq.read_schema(path).metadata or {}).get(KEY))
+    except (OSError, pa.ArrowException):
+        return None
+
+
+def described_blocks(folder: Path) -> dict[str, dict[str, object]]:
+    """Return the descriptions of all blocks of a folder that have one, by name."""
+    abouts = {}
+    for path in sorted((folder / ENDS).glob("*.parquet")):
+        about = read_description(path)
+        if about is not None and about["name"] == path.stem:
+            abouts[path.stem] = about
+    return abouts
+
+
+def described_item(folder: Path, about: Mapping[str, Any]) -> Item | None:
+    """Return a block for the log, proved by its own description; None where it is not whole.
+
+    The description has the SHA-256 of the block's other files; the pages of the table it stands
+    in carry checksums.
+    """
+    import pyarrow as pa
+
+    table_file = f"{ENDS}/{about['name']}.parquet"
+    files = {**about["files"], table_file: digest(folder / table_file)}
+    item = Item(about["name"], files, {"first": about["first"], "last": about["last"]})
+    try:
+        if not item.intact(folder) or not _readable(folder / table_file):
+            return None
+        ended = read_ends(folder, files)
+    except (OSError, ValueError, pa.ArrowException):
+        return None
+    return None if ended is None else Item(item.name, files, {**item.data, **ended})
+
+
+def _readable(path: Path) -> bool:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        pq.read_table(path, page_checksum_verification=True)
+    except (OSError, pa.ArrowException):
+        return False
+    return True

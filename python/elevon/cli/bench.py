@@ -137,7 +137,7 @@ def _print(result: BenchResult, out: Path) -> None:
 
 def _story(out: Path, procedure: Procedure, *, force: bool) -> str:
     from elevon.bench.run import state_file
-    from elevon.bench.state import finished_logs
+    from elevon.bench.traces import finished_logs
 
     names = [trace.name for trace in procedure.traces]
     done = [n for n in finished_logs(state_file(out.expanduser(), procedure.name)) if n in names]

@@ -32,8 +32,7 @@ def plan(
 ) -> Answer:
     """Check a plan and say what it will take; nothing is written."""
     from elevon.campaign import load_plan, resolve_plan
-    from elevon.campaign.check import check
-    from elevon.campaign.estimate import estimate
+    from elevon.campaign.check import check, estimate
     from elevon.simulate.batch import checked_threads
 
     read, document = load_plan(plan)

@@ -20,7 +20,7 @@ dataset_make.add_to(app)
 def describe(folder: Path) -> Answer:
     """Say what is in a data set: runs, faults, distributions, columns."""
     from elevon.campaign import load_campaign
-    from elevon.campaign.describe import describe as described
+    from elevon.campaign.card import describe as described
 
     about = described(load_campaign(folder))
     return Answer(about, lambda: _print_about(about))

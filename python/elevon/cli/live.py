@@ -69,7 +69,7 @@ def _replay(
 
 
 def _page(bench: LiveBench | LogReplay, folder: Path, *, force: bool) -> None:
-    from elevon.live.static import write_static
+    from elevon.live.picture import write_static
 
     paths = write_static(bench, folder, force=force)
     sys.stdout.write(f"{len(paths)} files in {folder}\n")

@@ -97,7 +97,7 @@ class New:
 
     def write(self, bench: Path | None, *, force: bool) -> NewFiles:
         """Write the file, and the procedure where one is wanted; nothing of a wrong number."""
-        from elevon.bench.scaled import scaled_procedure
+        from elevon.bench.procedure import scaled_procedure
 
         for path in (self.path, bench):
             if path is not None:

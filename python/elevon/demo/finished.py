@@ -133,7 +133,7 @@ class FinishedSteps:
 def finished_steps(out: Path) -> list[str]:
     """Name the steps, and the logs, that an unfinished demonstration in a folder has finished."""
     from elevon.bench.run import state_file
-    from elevon.bench.state import finished_logs
+    from elevon.bench.traces import finished_logs
     from elevon.demo.procedure import demo_procedure
 
     log = _read(out / LOG)

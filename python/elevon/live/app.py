@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import asyncio
+import hmac
 import json
-from collections.abc import Awaitable, Mapping
+import math
+import secrets
+import struct
+import time as clock
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from importlib.resources import files
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import urlsplit
 
+import numpy as np
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from elevon.documents import check_depth
 from elevon.errors import ElevonError, InputError
-from elevon.live.control import Control, ControlError
-from elevon.live.frames import RATE, SharedFrames, SnapshotWriter
-from elevon.live.guard import MOST_BYTES, POLICY, Guard, message_of
+from elevon.live.loop import SampleRing
 from elevon.plain import plain
 from elevon.results import finite
 
@@ -26,6 +34,249 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from elevon.live.loop import LiveLoop
+
+
+MOST_BYTES = 64 * 1024
+"""Of a message."""
+_LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+
+#: Nothing from elsewhere, no inline script; styles of its own sheet.
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+
+
+@dataclass(frozen=True)
+class Guard:
+    """The rules of one server.
+
+    Attributes
+    ----------
+    host : str
+        Address it listens on.
+    token : str
+        Asked for where that is not loopback; empty: none.
+    """
+
+    host: str = "127.0.0.1"
+    token: str = ""
+
+    @property
+    def local(self) -> bool:
+        """Whether only this machine reaches it."""
+        return self.host in _LOOPBACK
+
+    def refuses(self, headers: Mapping[str, str], token: str) -> str | None:
+        """Return why a request is refused; None where it is not.
+
+        A page of another site may send requests to this machine: the browser names its origin, and
+        the name it used for this server.
+        """
+        host = headers.get("host", "")
+        name = urlsplit(f"//{host}").hostname or ""
+        if self.local and name not in _LOOPBACK:
+            return f"host {host!r:.60} is not this machine"
+        origin = headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return f"origin {origin!r:.60} is not this page"
+        if self.token and not hmac.compare_digest(token.encode(), self.token.encode()):
+            return "the token is missing or wrong"
+        return None
+
+
+def message_of(text: str | bytes) -> dict[str, object]:
+    """Read one JSON object.
+
+    Raises
+    ------
+    InputError
+        Longer than 64 KiB, no JSON, no object, NaN, nested too deeply.
+    """
+    if len(text) > MOST_BYTES:
+        raise InputError(f"a message of {len(text)} bytes; at most {MOST_BYTES}")
+    try:
+        read = json.loads(
+            text,
+            parse_constant=_refused,
+            parse_float=_finite,
+            parse_int=lambda digits: int(_short(digits)),
+        )
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"no JSON: {str(error)[:80]}") from error
+    if not isinstance(read, dict):
+        raise InputError(f"a JSON object is expected, not {type(read).__name__}")
+    check_depth(read, "message")
+    return read
+
+
+def _refused(name: str) -> float:
+    raise ValueError(f"{name} is no number")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:20]} is beyond floats")
+    return value
+
+
+def _short(digits: str) -> str:
+    if len(digits) > 18:
+        raise ValueError(f"{digits[:20]}... is too long a whole number")
+    return digits
+
+
+_IDLE = 60.0  # s after which another viewer may take over
+
+
+class ControlError(ElevonError):
+    """Somebody else has the bench."""
+
+    exit_code = 2
+
+
+class Control:
+    """The viewers that are connected, and which of them has control."""
+
+    def __init__(self) -> None:
+        self._viewers: set[str] = set()
+        self._holder = ""
+        self._last = 0.0
+        self._lock = Lock()
+
+    @property
+    def holder(self) -> str:
+        """The viewer in control; empty: none."""
+        return self._holder
+
+    @property
+    def viewers(self) -> int:
+        """How many are connected."""
+        return len(self._viewers)
+
+    def join(self) -> str:
+        """Return the name of a new viewer."""
+        name = secrets.token_urlsafe(9)
+        with self._lock:
+            self._viewers.add(name)
+        return name
+
+    def leave(self, name: str) -> None:
+        """Forget a viewer; what it held is free."""
+        with self._lock:
+            self._viewers.discard(name)
+            if self._holder == name:
+                self._holder = ""
+
+    def release(self, name: str) -> None:
+        """Give control up."""
+        with self._lock:
+            if self._holder == name:
+                self._holder = ""
+
+    def claim(self, name: str) -> None:
+        """Take control where nobody has it, or has not used it for a minute.
+
+        Parameters
+        ----------
+        name : str
+            A viewer; empty or unknown: a program, which acts where no viewer has control and holds
+            nothing.
+
+        Raises
+        ------
+        ControlError
+            A viewer has it.
+        """
+        with self._lock:
+            now = clock.monotonic()
+            busy = bool(self._holder) and now - self._last < _IDLE
+            if self._holder and self._holder != name and (busy or name not in self._viewers):
+                raise ControlError("another viewer has control; it is free when that one leaves")
+            if name in self._viewers:
+                self._holder, self._last = name, now
+
+
+RATE = 30.0
+"""Snapshots a second."""
+MOST_ROWS = 96
+"""Rows of a snapshot: more samples are thinned to them."""
+_HEAD = struct.Struct("<ddfIII")
+
+
+class SharedFrames:
+    """What viewers have in common: each snapshot and each state is encoded once for all.
+
+    Parameters
+    ----------
+    ring : SampleRing
+        Where samples come from.
+    state : callable
+        Returns the bench's state as text.
+    """
+
+    def __init__(self, ring: SampleRing, state: Callable[[], str]) -> None:
+        self.ring = ring
+        self._state = state
+        self._tick, self._noted = -1.0, -1
+        self._last = ring.written
+        self._text = ""
+        self._bodies: dict[tuple[int, tuple[int, ...]], tuple[int, bytes]] = {}
+
+    def at(self, tick: float) -> int:
+        """Go on to a picture's number; return the number of the sample up to which it goes."""
+        if tick != self._tick:
+            self._tick, self._last = tick, self.ring.written
+            self._bodies.clear()
+        return self._last
+
+    def state(self, number: int) -> str:
+        """Return the state as text; made anew when its number is another one."""
+        if number != self._noted:
+            self._noted, self._text = number, self._state()
+        return self._text
+
+    def body(self, first: int, columns: tuple[int, ...]) -> tuple[int, bytes]:
+        """Return the rows from a sample on to the picture's last, and how many they are."""
+        key = (first, columns)
+        if key not in self._bodies:
+            times, values = self.ring.between(first, self._last, columns, MOST_ROWS)
+            packed = times.astype("<f8").tobytes() + values.astype(np.dtype("<f4")).tobytes()
+            self._bodies[key] = (len(times), packed)
+        return self._bodies[key]
+
+
+class SnapshotWriter:
+    """Packs what is new in a ring for one viewer.
+
+    A snapshot holds, little-endian: time [s] and factor as float64, the factor asked for as
+    float32, then as uint32 the number of the choice of signals, rows and columns; then the rows'
+    instants as float64 and their values as float32, row by row.
+
+    Parameters
+    ----------
+    frames : SharedFrames
+        Where samples come from.
+    """
+
+    def __init__(self, frames: SharedFrames) -> None:
+        self._frames = frames
+        self._next = frames.ring.written
+        self._columns: tuple[int, ...] = ()
+        self._choice = 0
+
+    def choose(self, names: Sequence[str], choice: int) -> None:
+        """Take other signals from now on; those that are not there are left out."""
+        self._columns, self._choice = tuple(self._frames.ring.columns(names)), choice
+
+    def pack(self, tick: float, time: float, factor: float, wanted: float) -> bytes:
+        """Return the snapshot of what came since the last one, for a picture's number."""
+        last = self._frames.at(tick)
+        rows, body = self._frames.body(self._next, self._columns)
+        self._next = last
+        head = _HEAD.pack(time, factor, wanted, self._choice, rows, len(self._columns))
+        return head + body
 
 
 _STATE = 6  # snapshots to a state

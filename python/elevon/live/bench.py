@@ -3,24 +3,155 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.errors import ArgumentTypeError, InputError, unknown
+from elevon.arrays import Floats
+from elevon.errors import ArgumentTypeError, ElevonError, InputError, unknown
 from elevon.live.describe import description
 from elevon.live.health import HealthWatch
 from elevon.live.journal import Journal, moved_command
 from elevon.live.loop import LiveLoop
 from elevon.live.panel import WatchTable
-from elevon.live.recorder import Recorder, free_name
-from elevon.live.script import Script
 from elevon.live.trace import Stretch, trace_signals, write_stretch
 
 if TYPE_CHECKING:
     from elevon.live.unit import LiveUnit
+
+
+KINDS = ("drive", "full")
+_LONGEST_RECORDING = 3600.0  # s
+
+
+class Recorder:
+    """Takes samples from the simulation's thread until it is stopped.
+
+    Parameters
+    ----------
+    kind : str
+        ``drive`` or ``full``.
+    names : sequence of str
+        The signals that come.
+    columns : sequence of int
+        Those that are kept.
+    period : float
+        s between two samples.
+    """
+
+    def __init__(
+        self, kind: str, names: Sequence[str], columns: Sequence[int], period: float
+    ) -> None:
+        if kind not in KINDS:
+            raise InputError(f"record = {kind!r}; one of {', '.join(KINDS)}, true or false")
+        self.kind = kind
+        self.names = [names[i] for i in columns]
+        self._columns = list(columns)
+        self._most = int(_LONGEST_RECORDING / period)
+        self._time: list[float] = []
+        self._rows: list[Floats] = []
+
+    def __len__(self) -> int:
+        return len(self._time)
+
+    @property
+    def begun(self) -> float | None:
+        """Instant of the first sample [s]."""
+        return self._time[0] if self._time else None
+
+    def __call__(self, time: float, values: Sequence[float]) -> None:
+        """Take one sample; after an hour no more."""
+        if len(self._time) < self._most:
+            self._time.append(time)
+            self._rows.append(np.asarray([values[i] for i in self._columns]))
+
+    def taken(self) -> tuple[Floats, dict[str, Floats]]:
+        """Return the instants, shape (n,), and the signals.
+
+        Raises
+        ------
+        InputError
+            Fewer than two samples.
+        """
+        if len(self._time) < 2:
+            raise InputError("record: nothing was recorded yet")
+        table = np.asarray(self._rows)
+        return np.asarray(self._time), {n: table[:, i] for i, n in enumerate(self.names)}
+
+
+def free_name(folder: Path, stem: str, ending: str) -> Path:
+    """Return the first path of a numbered series that does not exist."""
+    for number in range(1, 100_000):
+        path = folder / f"{stem}-{number:03d}{ending}"
+        if not path.exists():
+            return path
+    raise InputError(f"{folder}: too many recordings of one name")
+
+
+_SLACK = 1e-6  # s: instants are whole samples, written in decimals
+
+
+@dataclass
+class Script:
+    """Steps as a journal holds them.
+
+    Attributes
+    ----------
+    mode : str
+        Of the command at the start; empty: as it is.
+    steps : deque of (float, mapping)
+        Instant from the start [s], and what is done.
+    error : str
+        Why it ended before its last step.
+    """
+
+    mode: str = ""
+    steps: deque[tuple[float, dict[str, Any]]] = field(default_factory=deque)
+    error: str = ""
+    _begun: float | None = None
+
+    @classmethod
+    def read(cls, given: object, known: Sequence[str]) -> Script:
+        """Read steps, times rising.
+
+        Raises
+        ------
+        InputError
+            No list of tables, a time that is none or falls, an act that is not known.
+        """
+        if not isinstance(given, list) or not all(isinstance(step, Mapping) for step in given):
+            raise ArgumentTypeError(f"repeat: {given!r:.60} is no list of steps")
+        script = cls()
+        for number, step in enumerate(given):
+            acts = dict(step)
+            time, mode = acts.pop("time", None), acts.pop("mode", "")
+            last = script.steps[-1][0] if script.steps else 0.0
+            if isinstance(time, bool) or not isinstance(time, (int, float)) or time < last:
+                raise InputError(f"repeat: step {number}: time = {time!r:.20}: must rise from 0 s")
+            for key in acts:
+                if key not in known or key == "repeat":
+                    raise unknown("key", key, known, f"repeat: step {number}")
+            script.mode = script.mode or str(mode)
+            script.steps.append((float(time), acts))
+        return script
+
+    def due(self, now: float, act: Callable[[Mapping[str, object]], object]) -> None:
+        """Do the steps whose instant has come; the first call is the start."""
+        self._begun = now if self._begun is None else self._begun
+        while self.steps and self.steps[0][0] <= now - self._begun + _SLACK:
+            try:
+                act(self.steps.popleft()[1])
+            except ElevonError as error:
+                self.error = str(error)
+                self.steps.clear()
+
+    def to_dict(self) -> dict[str, object]:
+        """Return how it stands."""
+        return {"left": len(self.steps), "error": self.error}
 
 
 #: What a message to `act` may hold, in the order in which it is done.

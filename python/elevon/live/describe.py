@@ -13,8 +13,7 @@ from elevon.units import display_unit, to_display
 from elevon.waveforms import wave_records
 
 if TYPE_CHECKING:
-    from elevon.live.limits import InputRange
-    from elevon.live.unit import LiveUnit
+    from elevon.live.unit import InputRange, LiveUnit
 
 
 #: What is drawn first, of the signals that an actuator has.

@@ -20,14 +20,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.errors import ElevonError
-from elevon.live.trace import LiveMotion, Stretch, write_stretch
-from elevon.live.watching import StreamWatch, Watch
+from elevon.live.trace import LiveMotion, StreamWatch, Stretch, Watch, write_stretch
 from elevon.plain import Plain
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.engine.answer import Diagnosis
     from elevon.logs.log import Log
+
+
+def remaining_life(answer: Diagnosis, actuator: Actuator, mission: str) -> str:
+    """Return the prediction in a sentence, or why there is none."""
+    from elevon.prognose.door import predict
+
+    try:
+        return predict([(0, answer)], actuator, mission).headline
+    except ElevonError as error:
+        return f"no prediction: {error}"
 
 
 FALSE_ALARM = 0.005
@@ -120,8 +129,6 @@ def examine(
         return Health(text=str(error).partition(": ")[2] or str(error))
     remaining = ""
     if mission is not None and answer.status == "faulty":
-        from elevon.live.remaining import remaining_life
-
         remaining = remaining_life(answer, actuator, mission)
     return health_of(answer, remaining=remaining, seconds=clock.process_time() - begin)
 

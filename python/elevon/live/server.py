@@ -11,7 +11,7 @@ from threading import Timer
 from typing import TYPE_CHECKING
 
 from elevon.errors import InputError
-from elevon.live.guard import Guard
+from elevon.live.app import Guard
 
 if TYPE_CHECKING:
     from elevon.live.bench import LiveBench

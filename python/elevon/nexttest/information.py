@@ -9,9 +9,9 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.bench.loaded import loaded_setups, run_loaded
+from elevon.bench.procedure import POSITION
 from elevon.bench.rig import setups
 from elevon.bench.stand import stand_of
-from elevon.bench.standard import POSITION
 from elevon.bench.traces import recorded
 from elevon.bench.virtual import traced
 from elevon.diagnose.by_model import reading_of

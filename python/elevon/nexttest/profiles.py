@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from elevon.bench.procedure import Procedure, load_procedure
-from elevon.bench.standard import standard_tests
+from elevon.bench.procedure import Procedure, load_procedure, standard_tests
 from elevon.bench.steps import BrakeStep, ForceStep, SettingsStep, TraceStep
 from elevon.bench.virtual import first_trace
 from elevon.calibrate.ways import turns

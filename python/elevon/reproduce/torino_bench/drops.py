@@ -16,8 +16,8 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.bench.load_module import GRAVITY
 from elevon.bench.procedure import Procedure
+from elevon.bench.rig import GRAVITY
 from elevon.calibrate.compliance import calibrate_compliance
 from elevon.calibrate.validation import bench_experiment
 from elevon.experiment import Experiment, Inputs

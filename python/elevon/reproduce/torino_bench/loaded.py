@@ -121,8 +121,8 @@ def reproduce_loaded(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.bench.micrometer import INTRINSIC_BACKLASH
     from elevon.bench.procedure import load_procedure
+    from elevon.bench.steps import INTRINSIC_BACKLASH
     from elevon.parameters.relations import motor_torque_constant
 
     unit, model = hidden_and_calibrated(seed, part(progress, 0.0, 0.25))
