@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from elevon.calibrate.validation import Validation
 from elevon.diagnose.engine.answer import Diagnosis
+from elevon.logs.foreign import ForeignLog
+from elevon.logs.report import ImportReport
+from elevon.number_text import quantity_text
 from elevon.plain import STORED, WORKING, Plain
+from elevon.report import Report, ReportTable
 from elevon.results import Result
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
+    from elevon.calibrate.validation import Validation
     from elevon.recording import Recording
     from elevon.report import Report
 
@@ -139,8 +145,6 @@ class Examination(Result):
 
     def report(self, *, date: str | None = None) -> Report:
         """Return its page: that of the diagnosis, then the data and the fit."""
-        from elevon.doctor.page import examination_page
-
         return examination_page(self, date)
 
     def write(self, folder: Path, *, force: bool = False) -> list[Path]:
@@ -154,3 +158,168 @@ class Examination(Result):
         if self.map_text:
             written.append(write_text(folder / "map.toml", self.map_text, force=force))
         return written
+
+
+#: Question to the codes of findings that answer it; what is in none belongs to ``others``.
+_QUESTIONS: Mapping[str, frozenset[str]] = {
+    "clock": frozenset({"jitter", "duplicates"}),
+    "gaps": frozenset({"gap", "missing", "empty"}),
+    "values": frozenset({"clipped", "stuck"}),
+    "columns": frozenset({"disagrees", "unit-unconfirmed", "convention-assumed"}),
+}
+_SOUND = {
+    "gaps": "no sample is missing",
+    "values": "nothing clipped, nothing stands still",
+    "columns": "they agree with each other",
+}
+_EVEN = 1e-6  # share of a period: what rounding leaves
+_MOST = 6  # findings stated for one question
+
+
+def checks_of(name: str, log: ForeignLog) -> list[DataCheck]:
+    """Return the questions to a log's data with their answers."""
+    seen = _seen(log.imported.report)
+    if log.guess is not None and log.guess.swapped:
+        names = " and ".join(f"{column!a}" for column in log.guess.swapped)
+        seen.setdefault("columns", []).append(f"{names} are swapped: read by what they do")
+    sound = {"clock": _clock(log.imported.report.clocks["drive"]), **_SOUND}
+    if log.guess is not None and log.column_map is not None and log.column_map.current:
+        sound["columns"] += f"; currents and voltages taken as {log.column_map.current} (ASSUMED)"
+    checks = [
+        DataCheck(name, question, question not in seen, _text_of(seen.get(question), text))
+        for question, text in sound.items()
+    ]
+    others = seen.get("others")
+    return checks + ([DataCheck(name, "others", False, _text_of(others, ""))] if others else [])
+
+
+def _seen(report: ImportReport) -> dict[str, list[str]]:
+    seen: dict[str, list[str]] = {}
+    for finding in report.findings:
+        if finding.level == "warning":
+            question = next((q for q, codes in _QUESTIONS.items() if finding.code in codes), "")
+            seen.setdefault(question or "others", []).append(f"{finding.place}: {finding.text}")
+    return seen
+
+
+def _text_of(texts: list[str] | None, otherwise: str) -> str:
+    if not texts:
+        return otherwise
+    more = f"; and {len(texts) - _MOST} more" if len(texts) > _MOST else ""
+    return "; ".join(texts[:_MOST]) + more
+
+
+def _clock(facts: Mapping[str, Any]) -> str:
+    jitter = facts["jitter_rms_s"]
+    even = jitter < _EVEN * facts["period_s"]
+    spread = "even" if even else f"jitter {1e3 * jitter:.2g} ms"
+    length = f"{facts['samples']} samples over {facts['duration_s']:.4g} s"
+    return f"{length} at {facts['rate_hz']:.5g} Hz, {spread}"
+
+
+def columns_of(name: str, log: ForeignLog) -> list[ReadColumn]:
+    """Return what each column of a log was taken for; with a guess, why."""
+    if log.guess is not None:
+        return [
+            ReadColumn(name, c.name, c.role or "", c.unit or "", "; ".join(c.reasons))
+            for c in log.guess.columns
+        ]
+    roles = {signal: role for role, signal in log.imported.recording.roles.items()}
+    return [
+        ReadColumn(name, c["column"], roles.get(c["name"], c["name"]), c["unit"])
+        for c in log.imported.report.channels
+    ]
+
+
+_DRAWN = 6  # logs
+
+
+def examination_page(result: Examination, date: str | None = None) -> Report:
+    """Return the report of a first look."""
+    report = Report("", date=date) if result.verdict is None else result.verdict.report(date=date)
+    report.title = f"First look at {', '.join(result.logs)}: {result.actuator}"
+    report.lead = result.headline
+    seen = [check for check in result.checks if not check.ok]
+    report.fact("Data", "sound" if not seen else f"{len(seen)} to look at", "clock, gaps, values")
+    report.fact("Columns", {"guess": "guessed"}.get(result.columns_by, f"by {result.columns_by}"))
+    report.fact("Model", _fit_word(result), "beside the logs")
+    _fit(report, result)
+    _data(report, result)
+    return report
+
+
+def _fit_word(result: Examination) -> str:
+    if result.fit is None:
+        return "not compared"
+    return f"{max(error.of_range for error in result.fit.errors):.3g} % off at worst"
+
+
+def _fit(report: Report, result: Examination) -> None:
+    section = report.section("The model beside the logs")
+    if result.fit is None:
+        section.text(f"Not compared: {result.reasons.get('fit', '')}")
+        _recorded(report, result)
+        return
+    section.table(
+        ReportTable(
+            ("log", "signal", "RMS error", "% of range", "threshold %", "passed"),
+            [
+                (e.log, e.signal, " ".join(quantity_text(e.rms, e.unit, 3)), e.of_range, e.limit,
+                 e.passed)
+                for e in result.fit.errors
+            ],
+            f"The same command on the model of the healthy unit, after {result.fit.transient:g} s. "
+            "A fault of the unit is in these errors, too; those of a healthy log are the model's.",
+            digits=3,
+        )
+    )  # fmt: skip
+    _charts(report, result.fit)
+
+
+def _charts(report: Report, fit: Validation) -> None:
+    units = {error.signal: error.unit for error in fit.errors}
+    for trace in fit.traces[:_DRAWN]:
+        section = report.section(f"Signals of {trace.log}")
+        for name, simulated in trace.simulated.items():
+            unit = display_unit(units.get(name, "1"))
+            lines = {
+                "log": to_display(trace.measured[name], unit),
+                "model": to_display(simulated, unit),
+            }
+            section.chart(name, trace.time, lines, y_label=f"[{unit}]", dashed=["model"])
+
+
+def _recorded(report: Report, result: Examination) -> None:
+    """Draw what was logged, where no model stands beside it."""
+    from elevon.recording.plot import panels_of
+
+    for name, recording in list(result.recordings.items())[:_DRAWN]:
+        section = report.section(f"Signals of {name}")
+        for panel in panels_of(recording):
+            section.chart(
+                panel.title or ", ".join(panel.lines),
+                panel.time,
+                panel.lines,
+                y_label=f"[{panel.unit}]",
+                breaks=panel.gaps,
+            )
+
+
+def _data(report: Report, result: Examination) -> None:
+    rows = [(c.log, c.check, "ok" if c.ok else "look", c.text) for c in result.checks]
+    marked = frozenset(k for k, check in enumerate(result.checks) if not check.ok)
+    report.section("Data").table(
+        ReportTable(("log", "question", "", "what was seen"), rows, marked=marked)
+    )
+    how = {
+        "map": "By the map that was given.",
+        "guess": "Guessed: correct map.toml where a column is not what it was taken for, and give "
+        "it with --map.",
+        "headers": "By the headers of the logs.",
+    }[result.columns_by]
+    report.section("Columns", how).table(
+        ReportTable(
+            ("log", "column", "taken for", "unit", "why"),
+            [(c.log, c.name, c.role or "?", c.unit, c.why) for c in result.columns],
+        )
+    )

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 from elevon.calibrate.door import validate
 from elevon.calibrate.validation import TRANSIENT, Validation
 from elevon.diagnose.door import diagnose
-from elevon.doctor.answer import Examination
-from elevon.doctor.data import checks_of, columns_of
+from elevon.doctor.answer import Examination, checks_of, columns_of
 from elevon.errors import InputError
 from elevon.logs.foreign import ForeignLog, import_foreign
 from elevon.logs.log import Log

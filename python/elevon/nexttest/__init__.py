@@ -2,6 +2,6 @@
 
 from elevon.nexttest.belief import Belief, Possible
 from elevon.nexttest.choose import NextTest, next_test
-from elevon.nexttest.profiles import BenchProfile, profiles
+from elevon.nexttest.information import BenchProfile, profiles
 
 __all__ = ["Belief", "BenchProfile", "NextTest", "Possible", "next_test", "profiles"]

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from elevon.diagnose.engine.candidates import candidates_of
 from elevon.errors import DivergedError, InputError, Interrupted
 from elevon.nexttest.belief import Belief
-from elevon.nexttest.information import expected_information, planned
-from elevon.nexttest.profiles import profiles
+from elevon.nexttest.information import expected_information, planned, profiles
 from elevon.plain import Plain, in_unit, key
 from elevon.results import Result
 

@@ -10,8 +10,7 @@ import numpy as np
 from elevon.arrays import Complex, Floats
 from elevon.errors import InputError
 from elevon.plain import Plain, in_unit, key
-from elevon.response.bode import BodeLines, zero_between
-from elevon.response.linear import LinearModel
+from elevon.response.linear import BodeLines, LinearModel, zero_between
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

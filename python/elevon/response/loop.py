@@ -19,7 +19,7 @@ from elevon.arrays import Complex, Floats
 from elevon.errors import InputError, unknown
 from elevon.plain import Plain, in_unit, key
 from elevon.progress import Progress
-from elevon.response.bode import BodeLines, zero_between
+from elevon.response.linear import BodeLines, zero_between
 from elevon.response.measure import Excitation, Multisine, frequencies
 from elevon.simulate import check_fidelity, solver_step
 from elevon.simulate.prepare import ActuatorLike, as_actuator
