@@ -55,7 +55,7 @@ class Hx711:
 
 @dataclass(frozen=True, slots=True)
 class BrakeRig:
-    """What the brake is made of.
+    """The parts of the brake rig and their numbers.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class BrakeRig:
 
 @dataclass(frozen=True, slots=True)
 class CellState:
-    """What of the load cell no one knows while it measures.
+    """Quantities of the load cell that nobody knows during the measurement.
 
     Attributes
     ----------
@@ -348,7 +348,7 @@ _LONGEST_WAIT = 1.0  # s from the trace's start to the trigger, and from there t
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """What chance sets for one log.
+    """The random conditions of one log.
 
     Attributes
     ----------
@@ -371,7 +371,7 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Rig:
-    """The bench as it stands: what the steps so far have made of it."""
+    """The present state of the bench after the steps so far."""
 
     backlash: float | None = None
     brake: tuple[Term, ...] = ()
@@ -439,7 +439,7 @@ class Setup(BenchSetup):
 
 
 def draw_conditions(seed: int, number: int) -> Conditions:
-    """Draw what chance sets for the `number`-th log of a procedure.
+    """Draw the random conditions of the `number`-th log of a procedure.
 
     ASSUMED, as none of it is printed: waits of up to 1 s each; a cell tared to 0.3 N, drifting by
     0.01 N/s, with 0.05 N of noise (a 50 kg cell on an HX711); a microcontroller's ceramic clock

@@ -238,7 +238,7 @@ class Resolved:
 
     @property
     def wiring(self) -> str:
-        """Of the actuator."""
+        """Name of the actuator's wiring."""
         return self.actuator.wiring
 
     def values(self, number: int) -> dict[str, object]:

@@ -64,7 +64,7 @@ class Guard:
 
     @property
     def local(self) -> bool:
-        """Whether only this machine reaches it."""
+        """Whether only this machine can reach the server."""
         return self.host in _LOOPBACK
 
     def refuses(self, headers: Mapping[str, str], token: str) -> str | None:
@@ -163,7 +163,7 @@ class Control:
         return name
 
     def leave(self, name: str) -> None:
-        """Forget a viewer; what it held is free."""
+        """Remove a viewer; control that it held becomes free."""
         with self._lock:
             self._viewers.discard(name)
             if self._holder == name:
@@ -225,20 +225,20 @@ class SharedFrames:
         self._bodies: dict[tuple[int, tuple[int, ...]], tuple[int, bytes]] = {}
 
     def at(self, tick: float) -> int:
-        """Go on to a picture's number; return the number of the sample up to which it goes."""
+        """Move to a picture number; return the number of the last sample that it holds."""
         if tick != self._tick:
             self._tick, self._last = tick, self.ring.written
             self._bodies.clear()
         return self._last
 
     def state(self, number: int) -> str:
-        """Return the state as text; made anew when its number is another one."""
+        """Return the state as text, encoded again when its number has changed."""
         if number != self._noted:
             self._noted, self._text = number, self._state()
         return self._text
 
     def body(self, first: int, columns: tuple[int, ...]) -> tuple[int, bytes]:
-        """Return the rows from a sample on to the picture's last, and how many they are."""
+        """Return the encoded rows from a sample to the last one of the picture, and their number."""
         key = (first, columns)
         if key not in self._bodies:
             times, values = self.ring.between(first, self._last, columns, MOST_ROWS)
@@ -248,7 +248,7 @@ class SharedFrames:
 
 
 class SnapshotWriter:
-    """Packs what is new in a ring for one viewer.
+    """Packs the new samples of a ring for one viewer.
 
     A snapshot holds, little-endian: time [s] and factor as float64, the factor asked for as
     float32, then as uint32 the number of the choice of signals, rows and columns; then the rows'
@@ -267,11 +267,11 @@ class SnapshotWriter:
         self._choice = 0
 
     def choose(self, names: Sequence[str], choice: int) -> None:
-        """Take other signals from now on; those that are not there are left out."""
+        """Select the signals sent from now on; unknown ones are left out."""
         self._columns, self._choice = tuple(self._frames.ring.columns(names)), choice
 
     def pack(self, tick: float, time: float, factor: float, wanted: float) -> bytes:
-        """Return the snapshot of what came since the last one, for a picture's number."""
+        """Return the snapshot of the samples since the last one, for a picture number."""
         last = self._frames.at(tick)
         rows, body = self._frames.body(self._next, self._columns)
         self._next = last
@@ -294,32 +294,32 @@ _HEADERS = {
 
 
 class Exhibit(Protocol):
-    """What the server needs of a bench or of a log that is played."""
+    """What the server needs of a bench or of a replayed log."""
 
     loop: LiveLoop
     files: list[Path]
 
     def describe(self) -> dict[str, object]:
-        """Return what does not change."""
+        """Return the constant description."""
         ...
 
     def state(self) -> dict[str, object]:
-        """Return how it stands."""
+        """Return the present state."""
         ...
 
     def act(self, message: Mapping[str, object]) -> dict[str, object]:
-        """Do what a message says."""
+        """Carry out the action of a message."""
         ...
 
 
 class ActBell:
-    """Tells whoever waits that an act has been done, and one sample since."""
+    """Signals to waiting viewers that an action has been carried out and one sample has followed."""
 
     def __init__(self) -> None:
         self._waiting: set[asyncio.Future[None]] = set()
 
     def done(self) -> None:
-        """Ring, a sample later."""
+        """Signal one sample later."""
         asyncio.get_running_loop().call_later(_SAMPLE, self._ring)
 
     def _ring(self) -> None:

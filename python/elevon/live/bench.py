@@ -140,7 +140,7 @@ class Script:
         return script
 
     def due(self, now: float, act: Callable[[Mapping[str, object]], object]) -> None:
-        """Do the steps whose instant has come; the first call is the start."""
+        """Carry out the steps that are due; the first call is the start."""
         self._begun = now if self._begun is None else self._begun
         while self.steps and self.steps[0][0] <= now - self._begun + _SLACK:
             try:
@@ -150,7 +150,7 @@ class Script:
                 self.steps.clear()
 
     def to_dict(self) -> dict[str, object]:
-        """Return how it stands."""
+        """Return the present state."""
         return {"left": len(self.steps), "error": self.error}
 
 
@@ -168,7 +168,7 @@ _ENDED = 1.0  # s after an action's motion has ended at which it is diagnosed
 
 
 class LiveBench:
-    """What a page, or a program, sees and moves.
+    """The bench as a page or a program sees and operates it.
 
     Parameters
     ----------
@@ -213,21 +213,21 @@ class LiveBench:
         self.loop.listener = self._sampled
 
     def start(self) -> None:
-        """Begin to run, and to watch."""
+        """Start the simulation and the health watch."""
         self.loop.start()
         self.watch.start()
 
     def stop(self) -> None:
-        """End both."""
+        """Stop the simulation and the health watch."""
         self.watch.stop()
         self.loop.stop()
 
     def describe(self) -> dict[str, object]:
-        """Return what a page must know of the actuator."""
+        """Return the description of the actuator that a page needs."""
         return description(self.unit)
 
     def state(self) -> dict[str, object]:
-        """Return time, factor, values, health, and how the bench stands."""
+        """Return time, speed factor, values, health and state of the bench."""
         unit, recorder = self.unit, self.recorder
         self.panel.refresh(unit)
         status, message = unit.status
@@ -250,7 +250,7 @@ class LiveBench:
         }
 
     def act(self, message: Mapping[str, object]) -> dict[str, object]:
-        """Do what a message says, between two samples; return what came of it.
+        """Carry out the action of a message between two samples; return its result.
 
         Parameters
         ----------
@@ -273,7 +273,7 @@ class LiveBench:
         return self.loop.call(lambda: self._act(message))
 
     def stretch(self) -> Stretch | str:
-        """Return what a drive has logged of late, or why there is nothing to look at."""
+        """Return the latest stretch of the drive's log, or why there is none."""
         return self.loop.call(self._stretch)
 
     def _act(self, message: Mapping[str, Any]) -> dict[str, Any]:

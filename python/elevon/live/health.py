@@ -61,7 +61,7 @@ class NamedFault(Plain):
 
 @dataclass(frozen=True)
 class Health(Plain):
-    """What diagnosis says of the last stretch.
+    """The diagnosis of the last stretch.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Health(Plain):
 
 
 def health_of(answer: Diagnosis, *, remaining: str = "", seconds: float = 0.0) -> Health:
-    """Return what a diagnosis says."""
+    """Return the health that a diagnosis states."""
     faults = tuple(
         NamedFault(
             cause.kind, cause.place, cause.severity, cause.unit, cause.interval,
@@ -119,7 +119,7 @@ def health_of(answer: Diagnosis, *, remaining: str = "", seconds: float = 0.0) -
 def examine(
     log: Log | str, actuator: Actuator, baselines: Sequence[str], mission: str | None
 ) -> Health:
-    """Diagnose a log; run in the process beside."""
+    """Diagnose a log (runs in the worker process)."""
     from elevon.diagnose.door import diagnose
 
     begin = clock.process_time()
@@ -135,14 +135,14 @@ def examine(
 
 @dataclass(frozen=True)
 class Request:
-    """What the process beside is asked: the log of a stretch, and the motion it is a part of."""
+    """Request to the worker process: the log of a stretch, and the motion that it is part of."""
 
     path: str
     motion: LiveMotion
 
 
 class Examiner:
-    """Diagnoses one stretch after the other, and watches the stream that they are.
+    """Diagnoses successive stretches and monitors the stream that they form.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ class Examiner:
         self._later: Callable[[], None] | None = None
 
     def examine(self, request: Request) -> Health:
-        """Return what diagnosis and monitor say of a stretch."""
+        """Return diagnosis and monitor result of a stretch."""
         from elevon.logs.read import read_log
 
         try:
@@ -175,7 +175,7 @@ class Examiner:
         return replace(health, watch=watch)
 
     def learn(self) -> None:
-        """Do what takes time, when the answer has been given."""
+        """Do the slow work after the answer has been given."""
         if self._later is not None:
             self._later()
             self._later = None
@@ -200,7 +200,7 @@ def _work(
 
 
 class HealthWatch:
-    """Diagnoses the last stretch, and the next one when that is done.
+    """Diagnoses the last stretch, then the next one.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class HealthWatch:
         self._thread.start()
 
     def stop(self) -> None:
-        """End; a diagnosis that is under way is dropped."""
+        """Stop; a running diagnosis is dropped."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -292,7 +292,7 @@ class HealthWatch:
         return answer
 
     def take(self, answer: Health, part: Stretch) -> None:
-        """Keep an answer, with when: what was looked at, and since when it is not healthy."""
+        """Keep an answer with its stretch, and the instant since which the unit is not healthy."""
         span = (float(part.time[0]), float(part.time[-1]))
         since, onset = None, answer.watch is not None and answer.watch.alarm
         if answer.watch is not None and onset:

@@ -28,7 +28,7 @@ _EDGE = 1e-9  # s in which a severity becomes the next: a table's instants must 
 
 
 class ScenarioWriter:
-    """Turns acts into the tables of a scenario file.
+    """Turns actions into the tables of a scenario file.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class ScenarioWriter:
         self._remarks: list[str] = []
 
     def remark(self, text: str) -> None:
-        """State what the file does not do."""
+        """Add a remark on what the file does not reproduce."""
         self._remarks.append(text)
 
     def text(self) -> str:
@@ -250,7 +250,7 @@ def moved_command(given: Mapping[str, Any], start: float) -> dict[str, Any]:
 
 
 class Journal:
-    """The acts on a unit with their instants, counted from its last start from rest.
+    """The actions on a unit with their instants, counted from its last start from rest.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ class Journal:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was: the unit has begun from rest, with what stands."""
+        """Clear the journal: the unit has started from rest with its present settings."""
         unit = self._unit
         self.zero, self.mode = unit.time, unit.mode
         self._missed = 0
@@ -278,7 +278,7 @@ class Journal:
         self.note({key: value for key, value in standing.items() if value})
 
     def note(self, done: Mapping[str, Any]) -> None:
-        """Note what was done now."""
+        """Record an action at the present instant."""
         acts = {key: value for key, value in done.items() if key not in _QUIET}
         if acts and len(self._entries) < _MOST:
             self._entries.append((round(self._unit.time - self.zero, 9), acts))
@@ -286,11 +286,11 @@ class Journal:
             self._missed += 1
 
     def steps(self) -> list[dict[str, Any]]:
-        """Return the acts, each with its instant [s]; what a bench takes to do them again."""
+        """Return the actions with their instants [s], as a bench takes them to repeat them."""
         return [{"time": 0.0, "mode": self.mode}, *({"time": t, **a} for t, a in self._entries)]
 
     def scenario(self) -> str:
-        """Return a scenario file that does what was done; comments state what none can.
+        """Return a scenario file that repeats the actions; comments state what it cannot repeat.
 
         Raises
         ------

@@ -49,7 +49,7 @@ class SampleRing:
             self.written += 1
 
     def clear(self) -> None:
-        """Forget the samples: the time that follows does not go on from them."""
+        """Remove the samples: the following time does not continue them."""
         with self._lock:
             self._time[:] = np.nan
 
@@ -127,16 +127,16 @@ class LiveLoop:
 
     @property
     def factor(self) -> float:
-        """The factor asked for; what is reached stands in `reached_factor`."""
+        """The requested speed factor; `reached_factor` is the one achieved."""
         return self._factor
 
     def set_factor(self, factor: float) -> None:
-        """Ask for another factor; of the loop's own thread."""
+        """Request another speed factor (on the loop's own thread)."""
         self._factor = check_factor(factor)
         self._rebase()
 
     def pause(self, paused: bool) -> None:
-        """Let time stand, or go on; of the loop's own thread."""
+        """Pause or continue (on the loop's own thread)."""
         self.paused = paused
         self._rebase()
 
@@ -154,7 +154,7 @@ class LiveLoop:
             self._thread.join()
 
     def call(self, work: Callable[[], Value], timeout: float = 10.0) -> Value:
-        """Do something between two samples, on the loop's thread; return what it returns."""
+        """Call a function between two samples, on the loop's thread; return its result."""
         if not self._thread.is_alive():
             return work()
         answer: Future[Value] = Future()
@@ -197,7 +197,7 @@ class LiveLoop:
         return False
 
     def sample(self) -> None:
-        """Go on by one sample, whatever the clock says."""
+        """Advance by one sample, whatever the clock says."""
         before = self.source.time
         values = self.source.step()
         time = self.source.time

@@ -39,7 +39,7 @@ class WatchTable:
     _home_at: float | None = None
 
     def refresh(self, unit: LiveUnit) -> None:
-        """Take note of what has come about: homing that has ended, an error."""
+        """Update the switches after an event: homing that has ended, an error."""
         if unit.status[0] != "ok":
             self.enabled = self.homed = self.moving = False
             self._home_at = None
@@ -47,7 +47,7 @@ class WatchTable:
             self.homed, self._home_at = True, None
 
     def to_dict(self) -> dict[str, object]:
-        """Return the switches for whoever shows them."""
+        """Return the switches for display."""
         return {
             "enabled": self.enabled,
             "homed": self.homed,
@@ -71,7 +71,7 @@ class WatchTable:
             unit.command(command)
 
     def act(self, unit: LiveUnit, action: str) -> None:
-        """Throw a switch.
+        """Operate a switch.
 
         Raises
         ------

@@ -53,7 +53,7 @@ class _LogSource:
 
 
 class LogReplay:
-    """Runs through a log against the clock; takes no commands.
+    """Replays a log against the clock; takes no commands.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class LogReplay:
         self.loop.stop()
 
     def describe(self) -> dict[str, object]:
-        """Return what a page must know of the log."""
+        """Return the description of the log that a page needs."""
         drawn = {name for _, names in PLOTS for name in names}
         present = [name for name in self.source.names if name in drawn]
         plots = [{"title": panel, "signals": lines} for panel, lines in self._model]
@@ -145,7 +145,7 @@ class LogReplay:
         }
 
     def state(self) -> dict[str, object]:
-        """Return time, factor, values and the verdict on the log."""
+        """Return time, speed factor, values and the verdict on the log."""
         source = self.source
         status, message = source.status
         return {

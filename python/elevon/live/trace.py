@@ -41,7 +41,7 @@ _STANDING = ("constant", "step")
 
 @dataclass(frozen=True)
 class Watch(Plain):
-    """What the monitor says.
+    """The result of the monitor.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def window_of(command: Mapping[str, Any] | None) -> float | None:
 
 
 class StreamWatch:
-    """Watches the stretches of one motion after the other.
+    """Monitors the successive stretches of one motion.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class StreamWatch:
         self._statistic = 0.0
 
     def take(self, log: Log, motion: LiveMotion, *, healthy: bool) -> Watch | None:
-        """Feed what is new in a stretch; None where nothing is watched yet.
+        """Feed the new samples of a stretch; None where no baseline exists yet.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ _NOISE = 0.05  # N of the load cell. ASSUMED, as on the virtual bench
 
 @dataclass(frozen=True)
 class LiveMotion:
-    """What a stretch is a part of.
+    """The motion that a stretch is part of.
 
     Attributes
     ----------

@@ -33,7 +33,7 @@ _AHEAD, _GRID = 120.0, 24_001  # s of a waveform that are looked at, and at how 
 
 @dataclass(frozen=True)
 class InputRange:
-    """Within which an input may be set, SI."""
+    """The range within which an input may be set, SI."""
 
     low: float
     high: float
@@ -109,14 +109,14 @@ _FILTERED = ("current_q_meas", "current_d_meas", "voltage_q_meas")
 
 
 class Source(Protocol):
-    """What the bench shows: an actuator that runs, or a log that is played."""
+    """What the bench shows: a running actuator or a replayed log."""
 
     names: tuple[str, ...]
     period: float
 
     @property
     def time(self) -> float:
-        """Instant that is reached [s]."""
+        """Present simulated time [s]."""
         ...
 
     @property
@@ -125,7 +125,7 @@ class Source(Protocol):
         ...
 
     def step(self) -> Sequence[float]:
-        """Go on by one period; return the value of each signal."""
+        """Advance by one period; return the value of each signal."""
         ...
 
 
@@ -135,7 +135,7 @@ def sample_period(step: float) -> float:
 
 
 class LiveUnit:
-    """An actuator in a session; what is done to it acts at the instant that is reached.
+    """An actuator in a session; actions on it act at the present instant.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class LiveUnit:
 
     @property
     def time(self) -> float:
-        """Instant that is reached [s]."""
+        """Present simulated time [s]."""
         return self._time
 
     @property
@@ -192,7 +192,7 @@ class LiveUnit:
 
     @property
     def ranges(self) -> dict[str, InputRange]:
-        """Within which each input may be set."""
+        """The range within which each input may be set."""
         return input_ranges(self.actuator, self.mode)
 
     @property
@@ -201,7 +201,7 @@ class LiveUnit:
         return self._session.actuators[0]
 
     def step(self) -> Sequence[float]:
-        """Go on by one sample; return the value of each signal.
+        """Advance by one sample; return the value of each signal.
 
         One that has diverged or tripped stands; its time goes on no more.
         """
@@ -213,7 +213,7 @@ class LiveUnit:
         return self.values()
 
     def values(self) -> list[float]:
-        """Return the signals as they stand."""
+        """Return the present values of the signals."""
         return list(self._session.read(*self.names).values())
 
     def command(self, given: Mapping[str, object]) -> None:
@@ -247,7 +247,7 @@ class LiveUnit:
         return read
 
     def hold(self) -> None:
-        """Let the command stand where the output stands: no motion, no torque asked for."""
+        """Hold the command at the present output: no motion and no torque is requested."""
         if self.mode == "gear":
             self._act("stop")
         else:
@@ -317,11 +317,11 @@ class LiveUnit:
             self.faults[name] = fault
 
     def restart(self) -> None:
-        """Begin anew from rest, with the faults and parameters as they are; time goes on."""
+        """Restart from rest with the present faults and parameters; time continues."""
         self._anew(self.now, {})
 
     def renew(self, mode: str) -> None:
-        """Begin anew from rest as at the very start: healthy, nothing set; time goes on."""
+        """Restart from rest as at the first start: healthy, nothing set; time continues."""
         if mode not in wirings()[self.actuator.wiring]["modes"]:
             raise unknown("mode", mode, wirings()[self.actuator.wiring]["modes"], "repeat")
         self.mode, self.given = mode, None

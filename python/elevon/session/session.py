@@ -270,7 +270,7 @@ class Session:
         self._driven.update(changes)
 
     def set_parameter(self, path: str, value: Value) -> None:
-        """Give a parameter another value, from now on, beneath the faults that act on it.
+        """Change a parameter from now on; faults act on the new value.
 
         Raises
         ------
@@ -332,7 +332,7 @@ class Session:
         faults: Iterable[str] = (),
         signals: Iterable[str] = (),
     ) -> None:
-        """Say what will be changed or read from now on, as at the start; nothing moves by it.
+        """Announce what will be changed or read from now on, as at the start; no state changes.
 
         What has run so far goes on bit for bit. Equations that were left out begin at the values
         of a healthy unit at rest.
@@ -367,7 +367,7 @@ class Session:
         return run_loop(self, duration, controller, period=period, record=record, progress=progress)
 
     def save(self) -> SessionState:
-        """Return the state as it is now; the session goes on without touching it."""
+        """Return a copy of the present state; the session continues independently of it."""
         if self._coupling is not None:
             raise InputError("save: the state of a coupled FMU is no part of the session's")
         return self._state()
@@ -377,7 +377,7 @@ class Session:
         return SessionState(self._core.copy(), self.actuators, faults, self._kind)
 
     def restore(self, state: SessionState) -> None:
-        """Go back (or forth) to a state that this session, or one made alike, saved."""
+        """Restore a state saved by this session or by one created in the same way."""
         if not isinstance(state, SessionState):
             raise ArgumentTypeError(f"state: a {type(state).__name__} is no SessionState")
         if state.kind != self._kind:

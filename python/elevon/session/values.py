@@ -71,7 +71,7 @@ def one_each(value: Value, runs: int, place: str) -> list[float | str]:
 
 
 def quantity(given: float | str, unit: str, place: str) -> float:
-    """Return SI; a text without a unit is refused where a person reads another one."""
+    """Return a quantity in SI; text without a unit is refused where users expect another unit than SI."""
     return parse_quantity(given, unit, place, display_unit(unit))
 
 
@@ -176,14 +176,14 @@ def _terms(port: str, given: Mapping[str, object], unit: str) -> list[CoreTerm]:
 
 
 def left_out(name: str, option: str) -> InputError:
-    """Return the error of a name that needs equations which the session left out."""
+    """Return the error for a name whose equations the session has left out."""
     return InputError(
         f"{name}: the equations in use leave it out; announce it: Session(..., {option}=[{name!r}])"
     )
 
 
 class SignalIndex:
-    """Where signals stand, and which of them the equations in use hold."""
+    """Positions of the signals, and which of them the equations in use compute."""
 
     def __init__(self, wiring: str, fidelity: str) -> None:
         self.places = {name: i for i, name in enumerate(signal_records(wiring, fidelity))}
@@ -205,7 +205,7 @@ class SignalIndex:
         return index
 
     def renew(self) -> None:
-        """Forget which are held: the equations have changed."""
+        """Reset the list of computed signals after a change of equations."""
         self._held.clear()
 
 
