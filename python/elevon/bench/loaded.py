@@ -169,7 +169,7 @@ class LoadedSetup(BenchSetup):
 
     @cached_property
     def factor(self) -> float:
-        """Factor on the commanded force: below one where the drive could not hold the requested one."""
+        """Factor on the commanded force: below one where the drive could not hold it."""
         force, command, most = self.force, self.trace.command, SHARE * holds(self.actuator)
         if force is None or command.mode != "position" or not np.isfinite(most):
             return 1.0

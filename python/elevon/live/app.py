@@ -238,7 +238,7 @@ class SharedFrames:
         return self._text
 
     def body(self, first: int, columns: tuple[int, ...]) -> tuple[int, bytes]:
-        """Return the encoded rows from a sample to the last one of the picture, and their number."""
+        """Return the encoded rows from a sample to the last of the picture, and their number."""
         key = (first, columns)
         if key not in self._bodies:
             times, values = self.ring.between(first, self._last, columns, MOST_ROWS)
@@ -313,7 +313,7 @@ class Exhibit(Protocol):
 
 
 class ActBell:
-    """Signals to waiting viewers that an action has been carried out and one sample has followed."""
+    """Signals to waiting viewers that an action is done and one sample has followed."""
 
     def __init__(self) -> None:
         self._waiting: set[asyncio.Future[None]] = set()

@@ -71,7 +71,7 @@ def one_each(value: Value, runs: int, place: str) -> list[float | str]:
 
 
 def quantity(given: float | str, unit: str, place: str) -> float:
-    """Return a quantity in SI; text without a unit is refused where users expect another unit than SI."""
+    """Return a quantity in SI; text without a unit is refused where users expect another."""
     return parse_quantity(given, unit, place, display_unit(unit))
 
 
