@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from elevon.containers.mat5 import variables
 from elevon.errors import FormatError
-from elevon.logs.formats.limits import Limits
-from elevon.logs.formats.matlab import has_variable, read_matlab
+from elevon.logs.formats.table import Limits
+from elevon.logs.formats.vectors import has_variable, read_matlab
 
 TYPES = ["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"]
 

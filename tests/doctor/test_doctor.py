@@ -10,7 +10,7 @@ from elevon.cli import main
 from elevon.diagnose.engine.answer import Cause, Diagnosis
 from elevon.doctor import door
 from elevon.errors import FormatError, InputError
-from elevon.logs import foreign
+from elevon.logs import read
 
 NAMES = "time_ms,pos_deg,motor_angle_deg,speed_demand_rpm,speed_rpm,iq_A"
 RATIO = 124.0
@@ -157,7 +157,7 @@ def test_a_guess_that_does_not_hold_says_how_to_correct_it(tmp_path, monkeypatch
     def contradicted(path, *, column_map, **_):
         raise (FormatError if column_map is None else InputError)("it contradicts the data")
 
-    monkeypatch.setattr(foreign, "import_log", contradicted)
+    monkeypatch.setattr(read, "import_log", contradicted)
     log = written(tmp_path / "a.csv", motion())
     with pytest.raises(InputError, match=r"the guess does not hold: .*a\.csv --guess map\.toml"):
         elevon.doctor(log, "torino-rotary")

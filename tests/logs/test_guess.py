@@ -11,8 +11,7 @@ from elevon.cli import main
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.formats.table import RawTable
 from elevon.logs.importing import import_log
-from elevon.logs.maps.guess import guess_map
-from elevon.logs.maps.hints import role_hint, unit_hint
+from elevon.logs.maps.guess import guess_map, role_hint, unit_hint
 
 LEAD = 5e-3  # m for one turn
 

@@ -14,7 +14,7 @@ from elevon.arrays import Floats
 from elevon.bench.rig import RATE, Hx711, Setup
 from elevon.errors import FormatError, InputError, OutputExistsError
 from elevon.files import check_output, write_text
-from elevon.logs.command.guess import FREE
+from elevon.logs.command.fit import FREE
 from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import write_loadcell
 from elevon.parameters.records import wirings

@@ -20,9 +20,8 @@ from elevon.errors import InputError
 from elevon.estimate.covariance import block_covariance, joined, robust_covariance
 from elevon.estimate.residual import fit_residual
 from elevon.estimate.signals import integral
-from elevon.logs.command.fit import WaveformFit, best_waveform, fit_waveform
-from elevon.logs.command.guess import FREE
-from elevon.logs.command.known import NotedCommand, align_noted, noted_values
+from elevon.logs.command.fit import FREE, WaveformFit, best_waveform, fit_waveform
+from elevon.logs.command.note import NotedCommand, align_noted, noted_values
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.log import Log, per_log
 from elevon.plain import REMAINDER, WORKING, Plain, key

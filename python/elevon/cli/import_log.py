@@ -73,8 +73,7 @@ def _guess(
     """Write a first column map, and say why every column is what it is."""
     from elevon.files import check_output, write_text
     from elevon.logs.formats.detect import read_table
-    from elevon.logs.maps.guess import guess_map
-    from elevon.logs.maps.guess_write import guess_text
+    from elevon.logs.maps.guess import guess_map, guess_text
 
     if len(logs) != 1 or out is not None:
         raise InputError("--guess writes the map of one log, and no recording")

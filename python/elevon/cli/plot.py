@@ -76,7 +76,7 @@ def _only_signals(
 
 
 def _recording(file: Path, run: int | None, column_map: Path | None) -> Recording:
-    from elevon.logs.foreign import import_foreign
+    from elevon.logs.read import import_foreign
 
     if file.expanduser().is_dir():
         from elevon.campaign import load_run

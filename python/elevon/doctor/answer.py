@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from elevon.calibrate.validation import Validation
 from elevon.diagnose.engine.answer import Diagnosis
-from elevon.logs.foreign import ForeignLog
+from elevon.logs.read import ForeignLog
 from elevon.logs.report import ImportReport
 from elevon.number_text import quantity_text
 from elevon.plain import STORED, WORKING, Plain

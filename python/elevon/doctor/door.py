@@ -12,11 +12,10 @@ from elevon.calibrate.validation import TRANSIENT, Validation
 from elevon.diagnose.door import diagnose
 from elevon.doctor.answer import Examination, checks_of, columns_of
 from elevon.errors import InputError
-from elevon.logs.foreign import ForeignLog, import_foreign
 from elevon.logs.log import Log
 from elevon.logs.maps.column_map import ColumnMap, find_map
-from elevon.logs.maps.guess_write import guess_text
-from elevon.logs.read import named_apart
+from elevon.logs.maps.guess import guess_text
+from elevon.logs.read import ForeignLog, import_foreign, named_apart
 from elevon.progress import Progress, part
 from elevon.simulate.prepare import as_actuator
 

@@ -307,7 +307,7 @@ def _served(recording: Recording) -> dict[str, Channel]:
     """Role to channel, as the recording states it; where it states nothing, by known names."""
     if "roles" in recording.meta:
         return {role: recording[name] for role, name in recording.roles.items()}
-    from elevon.logs.maps.signals import known_signals
+    from elevon.logs.maps.column_map import known_signals
 
     known = known_signals()
     named = {known[c.name].role: c for c in reversed(recording.channels) if c.name in known}

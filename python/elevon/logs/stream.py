@@ -13,13 +13,11 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.errors import FormatError, InputError, did_you_mean, quoted
 from elevon.logs.command.note import CommandNote
-from elevon.logs.formats.limits import DEFAULT_LIMITS
-from elevon.logs.formats.table import RawTable
+from elevon.logs.formats.table import DEFAULT_LIMITS, RawTable
 from elevon.logs.formats.text import LineReader, named_columns
 from elevon.logs.importing import gear_ratio_of, settle_currents
 from elevon.logs.maps.assign import Assignment, assign_columns
-from elevon.logs.maps.column_map import ColumnMap
-from elevon.logs.maps.signals import known_roles, known_signals
+from elevon.logs.maps.column_map import ColumnMap, known_roles, known_signals
 from elevon.logs.report import ImportReport
 
 SOURCE = "standard input"

@@ -13,7 +13,7 @@ import pytest
 from elevon.errors import InputError
 from elevon.estimate.covariance import correlated
 from elevon.logs.clocks.clock_fit import SharedLogs
-from elevon.logs.clocks.offset_search import search_offset
+from elevon.logs.clocks.sync import search_offset
 from elevon.logs.importing import import_log
 from tests.calibrate.foreign import CHIRP, LOADED, draw, run
 from tests.calibrate.foreign_files import Style, write_trial

@@ -7,8 +7,7 @@ import pytest
 
 from elevon.errors import InputError, UnknownNameError
 from elevon.estimate.covariance import robust_covariance
-from elevon.logs.command.fit import best_waveform, fit_waveform
-from elevon.logs.command.guess import FREE
+from elevon.logs.command.fit import FREE, best_waveform, fit_waveform
 from elevon.logs.command.reconstruct import CommandTrace, reconstruct
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.importing import import_log

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from elevon.errors import InputError
-from elevon.logs.command.known import align_noted, noted_values
-from elevon.logs.command.note import CommandNote, read_command_note
+from elevon.logs.command.note import CommandNote, align_noted, noted_values, read_command_note
 from elevon.logs.command.reconstruct import CommandTrace
 
 FULL = """

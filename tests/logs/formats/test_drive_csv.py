@@ -148,7 +148,7 @@ def test_utf16_and_long_lines_are_refused(tmp_path):
 
 
 def test_a_huge_table_is_refused_before_memory_is_used(tmp_path):
-    from elevon.logs.formats.limits import Limits
+    from elevon.logs.formats.table import Limits
 
     path = tmp_path / "big.csv"
     path.write_text("\n".join([HEADER, *rows(2000)]))
@@ -161,7 +161,7 @@ def test_a_huge_table_is_refused_before_memory_is_used(tmp_path):
 def test_a_gzip_bomb_stops_at_the_limit(tmp_path):
     import gzip
 
-    from elevon.logs.formats.limits import Limits
+    from elevon.logs.formats.table import Limits
 
     path = tmp_path / "bomb.csv.gz"
     path.write_bytes(gzip.compress(b"\n" * 8_000_000))

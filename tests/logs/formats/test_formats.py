@@ -15,9 +15,9 @@ from elevon.logs.formats import text
 from elevon.logs.formats.cranfield import DATA_DOI, read_cranfield
 from elevon.logs.formats.detect import file_kind, read_table
 from elevon.logs.formats.drive import write_drive_csv
-from elevon.logs.formats.limits import Limits
-from elevon.logs.formats.matlab import read_matlab
+from elevon.logs.formats.table import Limits
 from elevon.logs.formats.text import LineReader, read_text_table
+from elevon.logs.formats.vectors import read_matlab
 from elevon.logs.importing import import_log
 
 SMALL = Limits(values=20_000)

@@ -16,7 +16,7 @@ from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import read_loadcell, write_loadcell
 from elevon.logs.formats.text import read_text_table
 from elevon.logs.importing import import_log
-from elevon.logs.maps.signals import safe_name
+from elevon.logs.maps.column_map import safe_name
 from elevon.recording.channel import check_name
 from tests.logs.conftest import servo_log
 from tests.logs.formats.test_formats import MAP, WRITERS, foreign

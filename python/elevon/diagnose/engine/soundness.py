@@ -8,7 +8,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
-from elevon.logs.clocks.quality import clipped_share
+from elevon.logs.clocks.clock_fit import clipped_share
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

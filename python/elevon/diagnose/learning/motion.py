@@ -14,7 +14,7 @@ from elevon.diagnose.roles.numbers import numbers_of
 from elevon.diagnose.roles.reading import INPUTS
 from elevon.errors import InputError
 from elevon.logs.drive import group_means
-from elevon.logs.maps.signals import known_roles
+from elevon.logs.maps.column_map import known_roles
 
 if TYPE_CHECKING:
     from elevon.logs.log import Log

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.diagnose.monitor.filter import needed
 from elevon.errors import FormatError, InputError
-from elevon.logs.clocks.quality import clock_quality
+from elevon.logs.clocks.clock_fit import clock_quality
 from elevon.plain import Plain
 
 Bools = npt.NDArray[np.bool_]

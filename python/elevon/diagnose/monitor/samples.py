@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError, unknown
-from elevon.logs.maps.signals import known_roles, known_signals
+from elevon.logs.maps.column_map import known_roles, known_signals
 
 LATEST = 1e12  # s: a time stamp beyond that is none
 

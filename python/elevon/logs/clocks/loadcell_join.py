@@ -9,12 +9,11 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
-from elevon.logs.clocks.clock_fit import RESONATOR_STD, RESONATOR_TOLERANCE
-from elevon.logs.clocks.quality import clock_quality
+from elevon.logs.clocks.clock_fit import RESONATOR_STD, RESONATOR_TOLERANCE, clock_quality
 from elevon.logs.clocks.sync import ClockFit, align_clocks, find_trigger
 from elevon.logs.command.note import CommandNote
-from elevon.logs.formats.limits import Limits
 from elevon.logs.formats.loadcell import LoadCellLog, read_loadcell
+from elevon.logs.formats.table import Limits
 from elevon.logs.report import ImportReport
 from elevon.recording import Recording
 

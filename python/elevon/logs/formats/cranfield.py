@@ -13,8 +13,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import FormatError, did_you_mean
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
-from elevon.logs.formats.table import RawTable
+from elevon.logs.formats.table import DEFAULT_LIMITS, Limits, RawTable
 from elevon.logs.formats.text import read_text_table
 from elevon.logs.maps.column_map import shipped_map
 from elevon.recording import Recording

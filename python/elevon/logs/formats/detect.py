@@ -6,9 +6,7 @@ from pathlib import Path
 
 from elevon.containers.hdf import is_hdf5
 from elevon.errors import unknown
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
-from elevon.logs.formats.opening import head
-from elevon.logs.formats.table import RawTable
+from elevon.logs.formats.table import DEFAULT_LIMITS, Limits, RawTable, existing_file, head
 
 #: What `elevon import --format` takes.
 FORMATS = ("auto", "drive", "csv", "parquet", "netcdf", "mat", "recording", "cranfield")
@@ -54,15 +52,15 @@ def read_table(
     file = existing_file(path, limits)
     kind = file_kind(file) if log_format in {"auto", "drive", "recording"} else log_format
     if kind == "parquet":
-        from elevon.logs.formats.parquet import read_parquet
+        from elevon.logs.formats.vectors import read_parquet
 
         return read_parquet(file, limits=limits)
     if kind == "netcdf":
-        from elevon.logs.formats.netcdf import read_netcdf
+        from elevon.logs.formats.vectors import read_netcdf
 
         return read_netcdf(file, limits=limits)
     if kind == "mat":
-        from elevon.logs.formats.matlab import read_matlab
+        from elevon.logs.formats.vectors import read_matlab
 
         return read_matlab(file, limits=limits)
     from elevon.logs.formats.text import read_text_table

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError, did_you_mean
 from elevon.files import write_bytes
-from elevon.logs.maps.columns import drive_columns
+from elevon.logs.maps.column_map import drive_columns
 from elevon.units import to_display
 
 _STAND_INS = {"motor_position": "resolver_position", "resolver_speed": "motor_speed"}

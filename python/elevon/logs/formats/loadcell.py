@@ -17,7 +17,7 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.errors import FormatError, InputError, RangeError, quoted
 from elevon.files import write_bytes
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits
+from elevon.logs.formats.table import DEFAULT_LIMITS, Limits
 from elevon.logs.formats.text import read_text_table
 from elevon.units import check_kind, to_si
 

@@ -20,9 +20,15 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import FormatError, quoted
-from elevon.logs.formats.limits import DEFAULT_LIMITS, Limits, existing_file
-from elevon.logs.formats.opening import open_bytes
-from elevon.logs.formats.table import RawTable, split_unit, unique_names
+from elevon.logs.formats.table import (
+    DEFAULT_LIMITS,
+    Limits,
+    RawTable,
+    existing_file,
+    open_bytes,
+    split_unit,
+    unique_names,
+)
 
 _MISSING = {"", "nan"}
 _BYTES_PER_VALUE = 32

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.containers.hdf import array, datasets, is_hdf5, opened, text_attribute
+from elevon.containers.mat5 import Variable, variables
+from elevon.containers.parquet import columns, declared_bytes, is_numeric, unit_of
+from elevon.containers.parquet import opened as opened_parquet
 from elevon.errors import FormatError, quoted
-from elevon.logs.formats.limits import Limits
-from elevon.logs.formats.table import RawTable
+from elevon.logs.formats.table import (
+    DEFAULT_LIMITS,
+    Limits,
+    RawTable,
+    existing_file,
+    head,
+    split_unit,
+    unique_names,
+)
 
 #: A matrix with at most so many columns, and at least so many rows a column, holds signals side by
 #: side (ASSUMED): what is nearer to a square is something else.
@@ -132,3 +147,183 @@ def _length(vectors: Mapping[str, Floats]) -> int:
             if name.rpartition("/")[2].lower() == wanted:
                 return len(values)
     return max(len(values) for values in vectors.values())
+
+
+def numeric_vectors(path: Path, limits: Limits) -> Vectors:
+    """Return all vectors of numbers of an HDF5 file, with their units.
+
+    Raises
+    ------
+    FormatError
+        A damaged file, or one beyond the limits.
+    """
+    vectors = Vectors(str(path), limits)
+    with opened(path) as file:
+        for name, data in datasets(file):
+            values = (
+                data if isinstance(data, str) else _array(path, name, data, limits, vectors.size)
+            )
+            if isinstance(values, str):
+                vectors.pass_over(name, values)
+            else:
+                vectors.add(name, values.astype(np.float64), text_attribute(data, "units"))
+    return vectors
+
+
+def _array(
+    path: Path, name: str, data: object, limits: Limits, before: int
+) -> npt.NDArray[np.generic] | str:
+    """Return the numbers of a vector or a long matrix; of anything else say why not."""
+    bound = _bound(limits, f"{path}, {quoted(name)}", before, data)
+    return array(data, "fiub", bound, also=signals_side_by_side)
+
+
+def _bound(limits: Limits, place: str, before: int, data: Any) -> Callable[[int], None]:
+    """Return the check of a vector's bytes, and of its numbers beside those read before."""
+
+    def check(size: int) -> None:
+        limits.check_bytes(place, size)
+        limits.check_shape(place, before + int(data.size), 1)
+
+    return check
+
+
+def read_netcdf(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
+    """Read the numeric vectors of a NetCDF file, with their ``units`` attributes.
+
+    Raises
+    ------
+    FormatError
+        Not NetCDF, damaged, or larger than the limits.
+    """
+    file = existing_file(path, limits)
+    if is_hdf5(file):
+        return numeric_vectors(file, limits).table("netcdf 4")
+    if head(file, 4) not in (b"CDF\x01", b"CDF\x02"):
+        raise FormatError(f"{file}: not a NetCDF file")
+    limits.check_bytes(str(file), file.stat().st_size)
+    return _classic(file, limits)
+
+
+def _classic(file: Path, limits: Limits) -> RawTable:
+    from scipy.io import netcdf_file
+
+    vectors = Vectors(str(file), limits)
+    try:
+        with netcdf_file(str(file), "r", mmap=False) as content:
+            for name, variable in content.variables.items():
+                data = np.asarray(variable.data)
+                if data.dtype.kind not in "fiub" or sum(n > 1 for n in data.shape) > 1:
+                    vectors.pass_over(name, "not a vector of numbers")
+                    continue
+                unit = getattr(variable, "units", b"")
+                text = unit.decode("utf-8", "replace")[:40] if isinstance(unit, bytes) else ""
+                vectors.add(name, data.astype(np.float64).reshape(-1), text)
+    except FormatError:
+        raise
+    except Exception as error:
+        raise FormatError(f"{file}: damaged NetCDF file: {quoted(str(error))}") from error
+    return vectors.table("netcdf 3")
+
+
+def read_matlab(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
+    """Read the numeric vectors of a .mat file, at the top or inside one plain structure.
+
+    A long matrix is read as its columns, ``name_1``, ``name_2`` and on. Cells, objects, function
+    handles, sparse and complex values are named in the notes and never loaded.
+
+    Raises
+    ------
+    FormatError
+        Not a .mat file of version 5 or 7.3, damaged, or larger than the limits after expansion.
+    """
+    file = existing_file(path, limits)
+    if is_hdf5(file):
+        return numeric_vectors(file, limits).table("mat 7.3")
+    vectors = Vectors(str(file), limits)
+    for variable in _bounded(file, limits):
+        for label, item in _members(file, variable):
+            numbers = _numbers(item)
+            if isinstance(numbers, str):
+                vectors.pass_over(label, numbers)
+            else:
+                vectors.add(label, numbers)
+    return vectors.table("mat 5")
+
+
+def has_variable(path: Path, name: str, limits: Limits) -> bool:
+    """Whether a version 5 file holds a variable of a name at its top; False for any other file."""
+    try:
+        with closing(_bounded(path, limits)) as listed:
+            return any(variable.name == name for variable in listed)
+    except FormatError:
+        return False
+
+
+def _bounded(path: Path, limits: Limits) -> Generator[Variable, None, None]:
+    return variables(path, lambda size: limits.check_bytes(str(path), size))
+
+
+def _members(path: Path, variable: Variable) -> Iterator[tuple[str, Variable]]:
+    """Yield the variable itself, or the fields of a structure."""
+    if variable.kind != "struct":
+        yield variable.name, variable
+        return
+    for member in variable.fields():
+        if member.kind == "struct":
+            raise FormatError(
+                f"{path}, {quoted(variable.name)}: a structure within a structure cannot be read"
+            )
+        yield f"{variable.name}/{member.name}", member
+
+
+def _numbers(item: Variable) -> Floats | str:
+    """Return a vector, or signals side by side; a text: why it is neither."""
+    if item.kind != "numbers":
+        return item.kind
+    if item.is_complex:
+        return "complex numbers"
+    if signals_side_by_side(item.shape):
+        return item.numbers().reshape(item.shape, order="F")
+    if sum(length != 1 for length in item.shape) > 1:
+        return f"neither a vector nor signals side by side, shape {item.shape}"
+    return item.numbers()
+
+
+def read_parquet(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
+    """Read the numeric columns of a Parquet file; a missing value becomes NaN.
+
+    Units are taken from the field metadata (``unit`` or ``units``) where present. Columns of
+    anything but numbers are named in the notes.
+
+    Raises
+    ------
+    FormatError
+        Damaged, empty, or larger than the limits.
+    """
+    file = existing_file(path, limits)
+    with opened_parquet(file) as parquet:
+        return _read(str(file), parquet, limits)
+
+
+def _read(source: str, parquet: Any, limits: Limits) -> RawTable:
+    schema = parquet.schema_arrow
+    fields = [field for field in schema if is_numeric(field.type)]
+    notes = [
+        f"{quoted(field.name)} passed over: {quoted(str(field.type))}"
+        for field in schema
+        if not is_numeric(field.type)
+    ]
+    if not fields:
+        raise FormatError(f"{source}: no column of numbers")
+    limits.check_shape(source, int(parquet.metadata.num_rows), len(fields))
+    limits.check_bytes(source, declared_bytes(parquet))
+    names = [field.name for field in fields]
+    labels = unique_names(source, [split_unit(name)[0] for name in names])
+    table = columns(parquet, names, lambda rows: limits.check_shape(source, rows, len(names)))
+    values = {label: quiet(table.values[name]) for label, name in zip(labels, names, strict=True)}
+    if not len(values[labels[0]]):
+        raise FormatError(f"{source}: no row")
+    units = (unit_of(field) or split_unit(field.name)[1] for field in fields)
+    stated = {label: unit for label, unit in zip(labels, units, strict=True) if unit}
+    return RawTable(source, values, stated, tuple(notes), "parquet")

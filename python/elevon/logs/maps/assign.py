@@ -8,17 +8,25 @@ from dataclasses import dataclass
 
 from elevon.arrays import Floats
 from elevon.errors import FormatError, InputError, quoted, unknown
-from elevon.logs.clocks.quality import IntArray
+from elevon.logs.clocks.clock_fit import IntArray
 from elevon.logs.formats.table import RawTable
-from elevon.logs.maps.column_map import ColumnEntry, ColumnMap
-from elevon.logs.maps.columns import drive_columns, find_drive_columns, looks_like_drive
+from elevon.logs.maps.column_map import (
+    ColumnEntry,
+    ColumnMap,
+    drive_columns,
+    find_drive_columns,
+    known_roles,
+    known_signals,
+    looks_like_drive,
+    safe_name,
+    unit_among,
+)
 from elevon.logs.maps.shafts import (
     PositionStatement,
     settle_encoder,
     settle_motor,
     travel_from_speed,
 )
-from elevon.logs.maps.signals import known_roles, known_signals, safe_name, unit_among
 from elevon.logs.report import ImportReport
 from elevon.units import parse_unit, si_unit
 

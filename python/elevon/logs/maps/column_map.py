@@ -2,18 +2,104 @@
 
 from __future__ import annotations
 
-from functools import cache
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from elevon.data import packaged_toml
 from elevon.documents import read_toml, validated
-from elevon.errors import FormatError, InputError, did_you_mean, nearest
-from elevon.logs.formats.limits import existing_file
-from elevon.logs.maps.signals import known_roles, known_signals
+from elevon.errors import FormatError, InputError, did_you_mean, nearest, quoted
+from elevon.logs.formats.table import RawTable, existing_file
 from elevon.recording.channel import check_name
 from elevon.strict import Strict
+from elevon.units import parse_unit
+
+
+@dataclass(frozen=True, slots=True)
+class LogSignal:
+    """A signal's SI units, its own shaft (``fast``, ``slow`` or none) and what it is.
+
+    `scaled` says how a value on the motor shaft becomes one on the slow shaft: ``angle`` divides by
+    the gear ratio, ``torque`` multiplies. `drive_current`: the drive may log it as rms.
+    """
+
+    units: tuple[str, ...]
+    shaft: str = ""
+    scaled: str = ""
+    drive_current: bool = False
+    role: str = ""
+
+
+_TABLES = packaged_toml("elevon.logs", "hints.toml")
+_TORQUES = ("motor_torque", "brake_torque", "load_torque")  # on the motor shaft
+_OF_THE_DRIVE = ("current_ref", "torque_current", "direct_current", "torque_voltage")
+
+
+@lru_cache(maxsize=1)
+def known_roles() -> Mapping[str, LogSignal]:
+    """Return what a signal in each role is; ``time`` among them."""
+    from elevon import _core
+
+    roles = {
+        role["name"]: LogSignal(
+            tuple(role["units"]),
+            _TABLES["shafts"].get(role["name"], ""),
+            "angle" if role["name"] in _TABLES["shafts"] else "",
+            role["name"] in _OF_THE_DRIVE,
+            role["name"],
+        )
+        for role in _core.roles()
+    }
+    return {"time": LogSignal(("s",)), **roles}
+
+
+@lru_cache(maxsize=1)
+def known_signals() -> Mapping[str, LogSignal]:
+    """Return every signal that a wiring can record or a log may hold, by its channel's name."""
+    from elevon import _core
+
+    roles, known = known_roles(), {"time": LogSignal(("s",))}
+    for wiring in _core.wirings():
+        for fidelity in wiring["fidelities"]:
+            for item in _core.signals(wiring["name"], fidelity):
+                torque = ("fast", "torque") if item["name"] in _TORQUES else ("", "")
+                plain = LogSignal((item["unit"] or "1",), *torque)
+                known.setdefault(item["name"], roles.get(item["role"] or "", plain))
+    return known | {name: roles[role] for name, role in _TABLES["of_logs"].items()}
+
+
+def unit_among(units: tuple[str, ...], stated: str | None, place: str) -> str:
+    """Return the SI unit, of those a signal may have, that a stated unit is of; the first if none.
+
+    Raises
+    ------
+    InputError
+        A unit of another kind, or none that is known.
+    """
+    if not stated:
+        return units[0]
+    dimension = parse_unit(stated, place).dimension
+    for unit in units:
+        if parse_unit(unit).dimension == dimension:
+            return unit
+    raise InputError(f"{place}: unit {stated!r}; expected {' or '.join(units)}, or the like")
+
+
+def safe_name(foreign: str, used: set[str]) -> str:
+    """Return a channel name for a foreign column: ASCII, at most 31 characters, not yet used."""
+    text = re.sub(r"[^A-Za-z0-9]+", "_", foreign).strip("_") or "column"
+    text = text if text[0].isalpha() else f"column_{text}"
+    stem = f"extra_{text}"[:27].rstrip("_")
+    name, number = stem, 2
+    while name.lower() in {other.lower() for other in used}:
+        name, number = f"{stem}_{number}", number + 1
+    return name
+
 
 _MOST_BYTES = 1_000_000
 Text = Annotated[str, Field(min_length=1, max_length=200)]
@@ -179,3 +265,80 @@ def shipped_maps() -> list[str]:
 def shipped_map(name: str) -> ColumnMap:
     """Return one of the package's own maps."""
     return read_column_map(Path(__file__).parent / f"{name}.toml")
+
+
+_PARAMETER = re.compile(r"(?:^|[^a-z])r0*(\d{2,4})(?:\[(\d)\]|\.\d+)?$")
+_TIME = {"xms", "x", "x[ms]", "time", "timems", "t", "tms", "zeit"}
+
+
+def drive_columns() -> dict[str, ColumnEntry]:
+    """Return the columns of the drive's trace by parameter (``r62``), ``time`` among them."""
+    return {entry.match: entry for entry in shipped_map("torino").column if entry.match}
+
+
+def find_drive_columns(table: RawTable, given: Collection[str] = ()) -> dict[str, str]:
+    """Find the drive's columns by the parameter number in their headers.
+
+    Case, blanks, the axis prefix and the trace prefix (``C0``, ``C1``) do not matter.
+
+    Parameters
+    ----------
+    table : RawTable
+        A log.
+    given : collection of str
+        Keys known already, from a column map.
+
+    Returns
+    -------
+    dict of str to str
+        Drive parameter (or ``time``) to the name of the column in the table.
+
+    Raises
+    ------
+    FormatError
+        No time column, no position column, or two columns of one parameter.
+    """
+    recognised: dict[str, str] = {}
+    for name in table.columns:
+        key = parameter_key(name)
+        if key is None:
+            continue
+        if key in recognised:
+            raise FormatError(
+                f"{table.source}: columns {quoted(recognised[key])} and {quoted(name)} are both "
+                f"{key}; name one of them in a column map"
+            )
+        recognised[key] = name
+    _check_columns(table, {*recognised, *given})
+    return recognised
+
+
+def looks_like_drive(table: RawTable) -> bool:
+    """Whether at least two columns carry numbers of the drive's parameters."""
+    return sum(parameter_key(name) not in {None, "time"} for name in table.columns) >= 2
+
+
+def parameter_key(name: str) -> str | None:
+    """Return the drive's parameter that a header carries (``r62``), ``time``, or None."""
+    text = re.sub(r"\s+", "", name).lower()
+    if text in _TIME:
+        return "time"
+    match = _PARAMETER.search(text) or _PARAMETER.search(re.sub(r"(axis_\d+)", r"\1.", text))
+    if match is None:
+        return None
+    number = match.group(1) + (match.group(2) or "")
+    return f"r{number}" if f"r{number}" in drive_columns() else None
+
+
+def _check_columns(table: RawTable, recognised: Collection[str]) -> None:
+    names = ", ".join(quoted(name) for name in list(table.columns)[:12])
+    if "time" not in recognised:
+        raise FormatError(
+            f"{table.source}: no time column (Xms){did_you_mean('Xms', table.columns)}; "
+            f"columns: {names}"
+        )
+    if "r4820" not in recognised and "r4821" not in recognised:
+        raise FormatError(
+            f"{table.source}: neither the motor's position (r4820) nor the output's (r4821); "
+            f"columns: {names}"
+        )
