@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from elevon.progress import Progress
     from elevon.report import Report, provenance
+    from studies.benchmark_set import BenchmarkScores
     from studies.fault_limits.limits import FaultLimits
 
 __all__ = ["app", "fault_limits", "fault_limits_page", "independent"]
@@ -83,6 +84,26 @@ def independent(
 
     plan = Plan(units, healthy, switching, seed, learned)
     return study_independent(plan, folder=folder, processes=processes, progress=progress)
+
+
+def benchmark_set(
+    set: Path,  # noqa: A002 - the option's name
+    seed: int,
+    *,
+    size: str = "small",
+    runs: int | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> BenchmarkScores:
+    """Return the scores of a benchmark set that is made, or gone on with."""
+    from elevon.progress import part
+    from studies.benchmark_set import BenchmarkScores, make_benchmark, score_benchmark
+
+    made = make_benchmark(
+        set, size=size, runs=runs, seed=seed, threads=threads, progress=part(progress, 0.0, 0.6)
+    )
+    scores = score_benchmark(set, seed=seed, progress=part(progress, 0.6, 1.0))
+    return BenchmarkScores(tuple(scores), made.failed)
 
 
 def _save_independent(result: Any, options: Options) -> None:

@@ -15,9 +15,10 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from elevon.diagnose.learning.answer import diagnose_by_classes
-from elevon.diagnose.learning.classes import HEALTHY
-from elevon.diagnose.learning.classify import LabelledLog, learned_classes, share_interval
-from elevon.diagnose.learning.motion import motion_of
+from elevon.diagnose.learning.door import learn
+from elevon.diagnose.learning.fit import share_interval
+from elevon.diagnose.learning.labels import HEALTHY, LabelledLog
+from elevon.diagnose.learning.motion import KnownMotion, motion_of
 from elevon.errors import ElevonWarning, InputError
 from elevon.progress import Progress
 from elevon.report import Check, verdict
@@ -26,7 +27,7 @@ from studies.independent.bench import units as units_of
 from studies.side_by_side import side_by_side
 
 if TYPE_CHECKING:
-    from elevon.diagnose.learning.classes import LearnedClasses
+    from elevon.diagnose.learning.model import LearnedClasses
     from elevon.logs.log import Log
 
 __all__ = ["LearnedResult", "study_learned"]
@@ -45,7 +46,7 @@ class LearnedResult:
     Attributes
     ----------
     report : dict
-        Of `LearnedClasses`: classifier, counts, groups left out.
+        Of `LearnedModel`: classifier, counts, groups left out.
     seen : tuple of (str, str, str)
         Label, status and named cause of each log of the units that were not learnt.
     refused : int
@@ -121,12 +122,13 @@ def study_learned(
     every = sum(map(len, logs.values()))
     logs = _of_one_motion(logs)
     known = [item for u in drawn[:count] for item in logs[str(u.number)]]
-    learned = learned_classes(
+    learned = learn(
         [log for log, _ in known], [label for _, label in known], pole_pairs=4.0, seed=seed
     )
+    assert learned.classes is not None
     others = [item for u in drawn[count:] for item in logs[str(u.number)]]
     refused = every - sum(map(len, logs.values()))
-    return LearnedResult(dict(learned.report), tuple(_seen(learned, others)), refused, seed)
+    return LearnedResult(dict(learned.report), tuple(_seen(learned.classes, others)), refused, seed)
 
 
 def _logs(unit: Unit, seed: int) -> Labelled:
@@ -152,12 +154,9 @@ def _logs(unit: Unit, seed: int) -> Labelled:
 def _of_one_motion(logs: dict[str, Labelled]) -> dict[str, Labelled]:
     """Leave out what `elevon learn` would refuse as another motion than the first log's."""
     first = motion_of(next(iter(logs.values()))[0][0])
+    known = KnownMotion(first.command, first.pace, first.seconds)
     return {
-        unit: [
-            item
-            for item in items
-            if not motion_of(item[0]).apart(first.command, first.pace, first.seconds)
-        ]
+        unit: [item for item in items if not known.refusal(motion_of(item[0]))]
         for unit, items in logs.items()
     }
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.diagnose.monitor.filter import ChangeFilter
 from elevon.errors import ElevonWarning, InputError
 from elevon.report import Check, verdict

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.diagnose.engine.candidates import CANDIDATES
+from elevon.diagnose.positions.reading import SPREAD
 from elevon.nexttest import Belief, Possible, profiles
 from elevon.nexttest.information import expected_information, likelihoods, planned
 from elevon.report import Check, verdict
@@ -226,7 +227,6 @@ class _Bench:
         from elevon.bench.virtual import traced
         from elevon.diagnose.positions.log import prepared
         from elevon.diagnose.positions.reading import logged_features
-        from elevon.diagnose.surrogate.population import day_of
         from elevon.scenario.compile import signal_records
         from elevon.simulate import Run, simulate_batch
 
@@ -234,7 +234,7 @@ class _Bench:
         days, ready = [], []
         for at, repeat in wanted:
             rng = np.random.default_rng([*seed, 2, at, repeat])
-            days.append(day_of(self.actuator, rng))
+            days.append(_day(self.actuator, rng))
             run_seed, procedure = int(rng.integers(2**31)), self.profiles[at].procedure
             ready.append(setups(procedure, days[-1].actuator, faults=faults, seed=run_seed)[0])
         record = recorded(list(signal_records(self.actuator.wiring, "low")))
@@ -246,6 +246,32 @@ class _Bench:
             names = self.cases[at].unit.names
             out.append(logged_features(item, self.actuator).only(names).values)
         return out
+
+
+@dataclass(frozen=True)
+class _Day:
+    """A unit on one day; `cell` is the measured brake torque over the true one."""
+
+    actuator: Actuator
+    cell: float
+
+
+def _day(unit: Actuator, rng: np.random.Generator) -> _Day:
+    """Draw a day of a unit within the stated spread of diagnosis by the model."""
+    values: dict[str, float | str] = {}
+    cell = 1.0
+    for path, (spread, way) in SPREAD.items():
+        step = spread * float(rng.standard_normal())
+        if way == "brake":
+            cell += step
+            continue
+        name = "sensor.current.gain_" + path[-1] if way == "fault" else path
+        old = unit.parameters.value(name)
+        values[name] = old + step if way == "add" else old * max(1.0 + step, 0.05)
+        if path == "friction.dynamic":
+            static = unit.parameters.value("friction.static")
+            values["friction.static"] = static * max(1.0 + step, 0.05)
+    return _Day(unit.with_values(values, source="day"), cell)
 
 
 class _Unit:

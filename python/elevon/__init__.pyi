@@ -9,7 +9,6 @@ from elevon.deploy import export_fmu as export_fmu
 from elevon.diagnose.door import diagnose as diagnose
 from elevon.diagnose.door import monitor as monitor
 from elevon.diagnose.learning.door import learn as learn
-from elevon.diagnose.learning.door import learn_spread as learn_spread
 from elevon.doctor.door import doctor as doctor
 from elevon.doors import bench as bench
 from elevon.doors import compare as compare

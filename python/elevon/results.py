@@ -38,7 +38,6 @@ _KINDS = {
     "next-test": "elevon.nexttest.choose:NextTest",
     "prognosis": "elevon.prognose.answer:Prognosis",
     "response": "elevon.response.estimate:FrequencyResponse",
-    "surrogate": "elevon.analysis.surrogate:Study",
     "validation": "elevon.calibrate.validation:Validation",
 }
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.progress import Progress
 from elevon.report import Check, verdict
 from studies.diagnosis_limits.campaign import Campaign, run_campaign

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.errors import DivergedError, InputError, unknown
 from elevon.progress import part
 from elevon.report import Check, verdict

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 
 if TYPE_CHECKING:
     from studies.fault_limits.limits import FaultLimits, Limit

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.report.checks import Check, verdict
 from studies.independent.bench import AND
 from studies.independent.campaign import Judged, Plan

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.prognose.law import LAWS
 from elevon.prognose.observation import SIGMAS
 from elevon.progress import Progress

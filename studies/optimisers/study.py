@@ -1,4 +1,4 @@
-"""Population searches on a monitor's misfit against diagnosis by the model and by the surrogate.
+"""Population searches on a monitor's misfit against diagnosis by the model.
 
 The literature on these actuators finds severities by making the misfit of a monitoring model small
 with a genetic algorithm, differential evolution, a particle swarm or grey wolves. Here they get
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -48,7 +48,7 @@ CASES: Mapping[str, Mapping[str, float]] = {
         "friction@transmission": 0.25,
     },
 }
-OURS = ("model", "both", "surrogate")
+OURS = "model"
 BUDGET = 2000
 """Evaluations of a search: fifty generations of forty. ASSUMED: of the literature's order."""
 _PROCEDURE = "backlash"
@@ -129,9 +129,9 @@ class OptimisersResult:
         }
 
     def checks(self) -> list[Check]:
-        """Return what must hold: the model's and the surrogate's error and time against each."""
+        """Return what must hold: the model's error and time against each."""
         over = {row["method"]: row for row in self.rows() if row["fault"] == "all"}
-        ours = over["model"]
+        ours = over[OURS]
         out = []
         for name in METHODS:
             error = ours["error_percent_of_range"] / over[name]["error_percent_of_range"]
@@ -144,7 +144,7 @@ class OptimisersResult:
         return out
 
     def _paired(self, name: str) -> list[float]:
-        ours = [o for o in self.outcomes if o.method == "model"]
+        ours = [o for o in self.outcomes if o.method == OURS]
         theirs = [o for o in self.outcomes if o.method == name]
         return [100.0 * (b.error - a.error) for a, b in zip(ours, theirs, strict=True)]
 
@@ -250,31 +250,17 @@ def _one(
     budget: int,
     seed: int,
 ) -> list[SearchOutcome]:
-    runs = _model_runs(unit, log)
-    _ours(unit, log, base)["surrogate"]()  # what is loaded once in a process is not timed
-    out = []
-    for method, run in _ours(unit, log, base).items():
-        _RECENT.clear()  # every log pays for its own model runs
-        begin = clock.process_time()
-        error = _error(_named(run()), case)
-        seconds = clock.process_time() - begin
-        count = 0 if method == "surrogate" else runs
-        out.append(SearchOutcome(case, method, error, count, seconds, math.nan))
-    goal = out[0].error
-    return out + [_searched(setup, log, case, m, goal, budget=budget, seed=seed) for m in METHODS]
-
-
-def _ours(unit: Actuator, log: Log, base: Log) -> dict[str, Callable[[], Diagnosis]]:
     from elevon.diagnose.by_model import diagnose
-    from elevon.diagnose.surrogate import diagnose_by_both, diagnose_by_surrogate
 
-    options: dict[str, Any] = {"baselines": [base], "faults": list(CAUSES)}
-    calls = (
-        partial(diagnose, [log], unit, **options),
-        partial(diagnose_by_both, [log], unit, **options),
-        partial(diagnose_by_surrogate, [log], unit, **options),
-    )
-    return dict(zip(OURS, calls, strict=True))
+    runs = _model_runs(unit, log)
+    _RECENT.clear()  # every log pays for its own model runs
+    begin = clock.process_time()
+    answer = diagnose([log], unit, baselines=[base], faults=list(CAUSES))
+    seconds = clock.process_time() - begin
+    error = _error(_named(answer), case)
+    ours = SearchOutcome(case, OURS, error, runs, seconds, math.nan)
+    searches = (_searched(setup, log, case, m, error, budget=budget, seed=seed) for m in METHODS)
+    return [ours, *searches]
 
 
 def _model_runs(unit: Actuator, log: Log) -> int:

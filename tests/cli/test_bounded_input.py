@@ -27,7 +27,7 @@ READERS = [
     ("loads", "FILE", *SURFACE, "--out", "x.csv"),
     ("next-test", *ROTARY, "--so-far", "FILE"),
     ("predict", ".", *ROTARY, "--mission", "FILE"),
-    ("diagnose", "log.csv", *ROTARY, "--method", "surrogate", "--surrogate", "FILE"),
+    ("diagnose", "log.csv", *ROTARY, "--model", "FILE"),
     ("import", "log.csv", "--map", "FILE", "--out", "out.parquet"),
     ("import", "log.csv", "--command", "FILE", "--out", "out.parquet"),
     ("import", "log.csv", "--loadcell", "FILE", "--out", "out.parquet"),

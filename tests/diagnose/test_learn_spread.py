@@ -23,7 +23,8 @@ from elevon.diagnose.engine.spread import (
     variances,
 )
 from elevon.diagnose.engine.table import Feature, FeatureVector
-from elevon.diagnose.learning.log_table import log_table, looked_up
+from elevon.diagnose.learning.labels import log_table, looked_up
+from elevon.diagnose.learning.model import LearnedModel
 from elevon.diagnose.learning.spread import TestResiduals, fitted
 from elevon.errors import ElevonWarning, FormatError, InputError
 from tests.diagnose.virtual import bench_logs
@@ -160,7 +161,7 @@ def test_of_a_fleet_units_are_ranked_and_not_days():
     assert LearnedSpread(units=4, days=120, held_out=half).rank(0.1, 0, 0.2) == 0.3
 
 
-def test_the_file_comes_back(tmp_path):
+def test_the_spread_comes_back_from_its_file(tmp_path):
     learnt = LearnedSpread(
         "unit",
         3,
@@ -169,17 +170,12 @@ def test_the_file_comes_back(tmp_path):
         {"a: b": FeatureSpread(VarianceFactor(2.5, 12.0), VarianceFactor(0.3, 1.5), 11.0)},
         (HeldOutLog(0, 1, 0.1, 0.2),),
     )
-    assert LearnedSpread.load(learnt.save(tmp_path / "s.toml")) == learnt
-    text = (tmp_path / "s.toml").read_text()
-    (tmp_path / "bad.toml").write_text(text.replace("2.5", "-2.5"))
+    model = LearnedModel(learnt)
+    assert model.holds == ["spread"]
+    assert LearnedModel.load(model.save(tmp_path / "s.npz")).spread == learnt
+    wrong = replace(learnt, features={"x": FeatureSpread(VarianceFactor(-2.5, 12.0))})
     with pytest.raises(FormatError, match="nought or more"):
-        LearnedSpread.load(tmp_path / "bad.toml")
-    (tmp_path / "old.toml").write_text(text.replace("version = 2", "version = 1"))
-    with pytest.raises(FormatError, match="learn it again"):
-        LearnedSpread.load(tmp_path / "old.toml")
-    (tmp_path / "other.toml").write_text("x = 1\n")
-    with pytest.raises(FormatError, match="learn-spread"):
-        LearnedSpread.load(tmp_path / "other.toml")
+        LearnedModel.load(LearnedModel(wrong).save(tmp_path / "bad.npz"))
 
 
 def test_a_table_names_each_log_once(tmp_path):
@@ -254,10 +250,11 @@ def test_days_that_scatter_more_are_learnt_and_no_longer_called_faulty(tmp_path)
         logs += bench_logs(day, [(200 + k, [])])
     *days, log = logs
     stated = elevon.diagnose(log, actuator, baselines=days[:1])
-    learnt = elevon.learn_spread(days, actuator)
-    assert learnt.deviations()["speed_gain"][0] > 2.0
+    learnt = elevon.learn(days, actuator=actuator)
+    assert learnt.holds == ["spread"]
+    assert learnt.spread.deviations()["speed_gain"][0] > 2.0
     answer = elevon.diagnose(
-        log, actuator, baselines=days[:1], spread=learnt.save(tmp_path / "spread.toml")
+        log, actuator, baselines=days[:1], model=learnt.save(tmp_path / "spread.npz")
     )
     assert stated.chance < 0.05 < answer.chance
     assert not answer.alarm
@@ -269,7 +266,7 @@ def test_one_recording_is_no_two_days():
     actuator = Actuator.load("torino-rotary")
     log = bench_logs(actuator, [(210, [])])[0]
     with pytest.raises(InputError, match="same recording as"):
-        elevon.learn_spread([log, replace(log, name="again")], actuator)
+        elevon.learn([log, replace(log, name="again")], actuator=actuator)
 
 
 @pytest.mark.long
@@ -278,6 +275,6 @@ def test_a_faulty_log_among_the_learnt_is_told_of():
     cases = [(220 + k, []) for k in range(4)] + [(224, ["backlash@transmission=0.13 deg"])]
     logs = [replace(x, name=f"day {k}") for k, x in enumerate(bench_logs(actuator, cases))]
     with pytest.warns(ElevonWarning, match="looks faulty itself") as caught:
-        elevon.learn_spread(logs, actuator)
+        elevon.learn(logs, actuator=actuator)
     names = [str(w.message).split(" looks")[0] for w in caught if "looks faulty" in str(w.message)]
     assert names == ["day 4"]

@@ -8,7 +8,6 @@ import pytest
 import elevon
 from elevon import Actuator
 from elevon.diagnose.engine.candidates import CANDIDATES, candidates_of
-from elevon.diagnose.surrogate.population import FAULTS
 from elevon.errors import FormatError
 from elevon.nexttest import Belief, Possible, profiles
 from elevon.nexttest.belief import read_result
@@ -96,11 +95,13 @@ def test_a_log_says_of_what_it_cannot_show_that_nothing_is_there():
     assert moved[SHORT,] > 2.0 * moved[()]
 
 
-def test_a_surrogates_result_stands_against_what_it_was_trained_on():
-    """It says one half of a fault that half of the runs do not have: twenty times as likely."""
-    detectable = dict.fromkeys(FAULTS, 0.1)
-    shares = {0: 0.37, 1: 0.7 * 0.65 / 9, 2: 0.7 * 0.25 / 36}
-    answer = {**RESULT, "detectable": detectable, "method": "surrogate"}
+def test_an_answer_of_classes_stands_against_what_was_learnt():
+    """It says one half of a fault that one log in ten had."""
+    faults = [SHORT, "backlash@transmission", "friction@transmission"]
+    detectable = dict.fromkeys(faults, 0.1)
+    shares = {0: 0.9**3, 1: 0.1 * 0.9**2}
+    prior = dict.fromkeys(faults, 0.1)
+    answer = {**RESULT, "detectable": detectable, "method": "learned", "prior": prior}
     belief, prior = _weights(Belief.after([answer])), _weights(Belief.prior())
     moved = [belief[keys] / prior[keys] for keys in ((SHORT,), ())]
     assert moved[0] / moved[1] == pytest.approx((0.5 / shares[1]) / (0.0998 / shares[0]), rel=1e-9)

@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 import elevon
-from elevon.diagnose.learning.classify import LabelledLog, learned_classes
+from elevon.diagnose.learning.labels import LabelledLog
 from elevon.errors import ElevonError
 from elevon.logs.formats.cranfield import read_cranfield
 from elevon.logs.log import Log
@@ -52,7 +52,7 @@ def test_real_classes_are_learnt_and_judged_by_runs_and_loads_left_out(shared):
         LabelledLog("healthy" if name == "normal" else name, f"run {run}", f"{load:g} kgf")
         for name, load, run, _ in items
     ]
-    left = learned_classes([log for *_, log in items], known).report["left_out"]
+    left = elevon.learn([log for *_, log in items], known).report["left_out"]
     print(left)  # noqa: T201
     assert left["unit"]["logs"] == len(items)
     assert left["unit"]["right"] > 0.75 * len(items)

@@ -318,6 +318,7 @@ def test_the_command_line(screw, tmp_path, capsys):
     assert '"status": "healthy"' in capsys.readouterr().out
     options = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
     assert main(["diagnose", str(path), *options]) == 2
+    assert "--method; give --model MODEL" in capsys.readouterr().err
 
 
 def loaded_log(actuator, compliance, *faults, seconds=3.0, day=1, force=1500.0, name="s"):

@@ -7,13 +7,11 @@ from typing import Any
 
 import typer
 
-from elevon.cli import dataset_make
 from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 
 app = group("Describe, verify, export, split a data set.")
-dataset_make.add_to(app)
 
 
 @command(app)

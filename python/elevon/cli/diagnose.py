@@ -30,10 +30,7 @@ def diagnose(
     command: list[Path] | None = None,
     column_map: Path | None = None,
     baseline: list[Path] | None = None,
-    method: str = "model",
     model: Path | None = None,
-    surrogate: Path | None = None,
-    spread: Path | None = None,
     fault: list[str] | None = None,
     false_alarm: float = 0.05,
     append: Path | None = None,
@@ -50,8 +47,8 @@ def diagnose(
     inspection = _inspection(append, usage, unit.name, force=force)
     result = run(
         common.read_logs(logs, column_map, loadcell, command), unit,
-        common.read_logs(baseline or [], column_map), method=method,
-        surrogate=surrogate, faults=fault, false_alarm=false_alarm, spread=spread, model=model,
+        common.read_logs(baseline or [], column_map), faults=fault, false_alarm=false_alarm,
+        model=model,
     )  # fmt: skip
     code = 0 if inspection is None else _append(inspection, result)
     return Answer(result, lambda: _print(result), code, page=result.report)
@@ -98,7 +95,7 @@ def _print(result: Diagnosis) -> None:
 
 
 def _severity(cause: Cause) -> tuple[str, str, str]:
-    """A severity with its interval; a class that was learnt has none."""
+    """A severity with its interval; a class may have none."""
     if math.isnan(cause.severity):
         return "-", "-", "-"
     return severity_texts(cause.severity, cause.interval, cause.unit)

@@ -9,6 +9,7 @@ import typer.core
 
 from elevon.cli.help import write_example
 from elevon.errors import nearest
+from elevon.retired import remark
 
 # The root of the argument errors (bad option, missing argument, ...) of whichever click typer uses.
 UsageError: Any = typer.BadParameter.__mro__[1]
@@ -21,6 +22,9 @@ class NamingGroup(typer.core.TyperGroup):
         """Return the command of the first argument, or raise `UsageError`."""
         known = self.list_commands(ctx)
         if args and not args[0].startswith("-") and args[0] not in known:
+            about = remark("command", f"{ctx.command_path.partition(' ')[2]} {args[0]}")
+            if about:
+                raise UsageError(f"No such command '{args[0]}'; {about}", ctx)
             near = nearest(args[0], known)
             hint = (
                 f" Did you mean {', '.join(near)}?" if near else f" Commands: {', '.join(known)}."

@@ -20,6 +20,7 @@ from elevon.cli.registry import COMMANDS
 from elevon.errors import ElevonError, ElevonWarning, Interrupted
 from elevon.extras import missing_package
 from elevon.files import journal
+from elevon.retired import remark
 
 USAGE = 2
 FAILED = 1
@@ -181,10 +182,13 @@ def _story(written: Sequence[Path], most: int = 4) -> str:
 
 
 def _usage(error: Any) -> int:
-    context = getattr(error, "ctx", None)
+    context, message = getattr(error, "ctx", None), error.format_message()
     if context is not None:
         typer.echo(context.get_usage(), err=True)
-    return _fail(error.format_message(), USAGE)
+        option = getattr(error, "option_name", "")
+        about = remark("option", f"{context.command_path.partition(' ')[2]} {option}")
+        message = f"No such option: {option}; {about}" if about else message
+    return _fail(message, USAGE)
 
 
 def _fail(message: str, code: int) -> int:

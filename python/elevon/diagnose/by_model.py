@@ -109,7 +109,8 @@ def diagnose(
     cases = [case_of(item, candidates, healthy, spread) for item in items]
     if spread is not None and not any(n in spread.features for c in cases for n in c.unit.names):
         raise InputError(
-            f"--spread: it was learnt of {spread.actuator}; none of its features is in these logs"
+            f"--model: the spread was learnt of {spread.actuator}; none of its features is in "
+            "these logs"
         )
     result = answer_of(cases, candidates, false_alarm, spread)
     if spread is not None:

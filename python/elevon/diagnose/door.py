@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import os
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
-from elevon.calibrate.ways import turns
-from elevon.diagnose.by_model import diagnose as by_model
+from elevon.diagnose.by_model import diagnose as diagnose_by_model
 from elevon.diagnose.by_model import traces_of
 from elevon.diagnose.engine.answer import Diagnosis
-from elevon.diagnose.engine.spread import LearnedSpread
+from elevon.diagnose.learning.answer import diagnose_by_classes, diagnose_by_spread_and_classes
 from elevon.diagnose.monitor.answer import Monitoring
 from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor
-from elevon.errors import InputError, unknown
+from elevon.errors import InputError
 from elevon.logs.read import as_logs
 from elevon.simulate.prepare import as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.learning.classes import LearnedClasses
-    from elevon.diagnose.surrogate import Surrogate
+    from elevon.diagnose.learning.model import LearnedModel
+    from elevon.diagnose.pictures import Traces
     from elevon.logs.log import Log
     from elevon.logs.read import LogsLike
     from elevon.simulate.prepare import ActuatorLike
-
-METHODS = ("model", "surrogate", "both", "learned")
 
 
 def diagnose(
@@ -36,12 +32,9 @@ def diagnose(
     actuator: ActuatorLike,
     baselines: LogsLike = (),
     *,
-    method: str = "model",
-    surrogate: Surrogate | str | os.PathLike[str] | None = None,
+    model: LearnedModel | str | os.PathLike[str] | None = None,
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
-    spread: LearnedSpread | str | os.PathLike[str] | None = None,
-    model: LearnedClasses | str | os.PathLike[str] | None = None,
 ) -> Diagnosis:
     """Say what is wrong with the unit that wrote the logs, where, how bad, how sure.
 
@@ -53,116 +46,73 @@ def diagnose(
         The healthy unit, calibrated.
     baselines : Log, path, or sequence of them
         Of the healthy unit; those of the same test serve.
-    method : str
-        ``model``; ``surrogate``; ``both``: the surrogate proposes, the model refines; ``learned``:
-        by `elevon.learn` from labelled logs.
-    surrogate : Surrogate or path, optional
-        Default: the package's own.
+    model : LearnedModel or path, optional
+        By `elevon.learn`. Its spread takes the place of the stated one; its classes answer in
+        place of the actuator's model, or, where it holds both, what that model cannot name.
     faults : sequence of str, optional
         ``KIND@PLACE`` of the candidates; default: all.
     false_alarm : float
         Rate at which a healthy unit may be called faulty.
-    spread : LearnedSpread or path, optional
-        By `elevon.learn_spread`; default: what the package states. Serves ``model``.
-    model : LearnedClasses or path, optional
-        By `elevon.learn`, or by ``elevon diagnose-train``. Serves ``learned``.
 
     Raises
     ------
     InputError
-        A log that cannot be diagnosed, no candidate, a rate outside 0 to 1, a method that does not
-        serve this actuator.
+        A log that cannot be diagnosed, no candidate, a rate outside 0 to 1.
+    FormatError
+        A file that is no model.
     """
     unit = as_actuator(actuator)
-    if method == "learned":
-        answer = _learned(logs, unit, baselines, model, faults=faults, rate=false_alarm)
-        return _signed(answer, unit, (), method)
-    if model is not None:
-        raise InputError("--model: serves --method learned")
-    run = _method(method, surrogate, spread)
+    learned = _model(model)
     if not 0.0 < false_alarm < 1.0:
         raise InputError(f"false-alarm rate {false_alarm:g} must be between 0 and 1")
-    if method != "model" and not turns(unit):
-        raise InputError(f"--method {method}: serves turning outputs; {unit.name} has none")
     data, healthy = as_logs(logs), _healthy(baselines)
-    result = run(data, unit, baselines=healthy, faults=faults, false_alarm=false_alarm)
-    draw = partial(traces_of, data, unit, result, healthy)
-    return replace(_signed(result, unit, healthy, method), draw=draw)
+    if learned.classes is None:
+        result = diagnose_by_model(
+            data, unit, baselines=healthy, faults=faults, false_alarm=false_alarm,
+            spread=learned.spread,
+        )  # fmt: skip
+    elif learned.spread is None:
+        if faults:
+            raise InputError("--fault: the classes are those of --model, which holds no spread")
+        result = diagnose_by_classes(
+            data, learned.classes, baselines=healthy, false_alarm=false_alarm
+        )
+    else:
+        result = diagnose_by_spread_and_classes(
+            data, unit, learned.spread, learned.classes, baselines=healthy, faults=faults,
+            false_alarm=false_alarm,
+        )  # fmt: skip
+    return _signed(result, data, unit, healthy)
 
 
-def _signed(result: Diagnosis, unit: Actuator, baselines: Sequence[Log], method: str) -> Diagnosis:
-    """Return an answer with what it stands on."""
+def _signed(
+    result: Diagnosis, logs: Sequence[Log], unit: Actuator, baselines: Sequence[Log]
+) -> Diagnosis:
+    """Return an answer with what it stands on; one of the model can draw the logs beside it."""
     from elevon import __version__
 
-    names = tuple(log.name for log in baselines)
+    def draw() -> list[Traces]:
+        return traces_of(logs, unit, result, baselines)
+
     return replace(
-        result, actuator=unit.name, parameter_hash=unit.hash, baselines=names,
-        made_by=__version__, method=method,
+        result, actuator=unit.name, parameter_hash=unit.hash, made_by=__version__,
+        baselines=tuple(log.name for log in baselines),
+        draw=draw if result.method == "model" else None,
     )  # fmt: skip
 
 
-def _learned(
-    logs: LogsLike,
-    actuator: Actuator,
-    baselines: LogsLike,
-    model: LearnedClasses | str | os.PathLike[str] | None,
-    *,
-    faults: Sequence[str] | None,
-    rate: float,
-) -> Diagnosis:
-    """Diagnose by a file of `elevon.learn`, or by a surrogate: both are learnt, in one format."""
-    from elevon.diagnose.learning.answer import diagnose_by_classes
-    from elevon.diagnose.learning.archive import read_archive
-    from elevon.diagnose.learning.classes import KIND, LearnedClasses
+def _model(given: LearnedModel | str | os.PathLike[str] | None) -> LearnedModel:
+    """Return what was learnt, read where it is a file; without a model nothing."""
+    from elevon.diagnose.learning.model import LearnedModel
 
-    if model is None:
-        raise InputError(
-            "--method learned needs --model FILE (elevon learn, elevon diagnose-train)"
-        )
-    if not isinstance(model, LearnedClasses) and read_archive(model)[0] != KIND:
-        return diagnose(
-            logs, actuator, baselines, method="surrogate", surrogate=model, faults=faults,
-            false_alarm=rate,
-        )  # fmt: skip
-    if faults or _healthy(baselines):
-        raise InputError("--method learned: classes are those of the model; no fault, no baseline")
-    classes = model if isinstance(model, LearnedClasses) else LearnedClasses.load(model)
-    result = diagnose_by_classes(as_logs(logs), classes, false_alarm=rate)
-    return replace(result, actuator=actuator.name)
+    if isinstance(given, LearnedModel):
+        return given
+    return LearnedModel() if given is None else LearnedModel.load(given)
 
 
 def _healthy(baselines: LogsLike) -> list[Log]:
     none = not isinstance(baselines, (str, os.PathLike)) and isinstance(baselines, Sequence)
     return [] if none and not len(baselines) else as_logs(baselines)  # type: ignore[arg-type]
-
-
-def _method(
-    method: str,
-    given: Surrogate | str | os.PathLike[str] | None,
-    spread: LearnedSpread | str | os.PathLike[str] | None,
-) -> Callable[..., Diagnosis]:
-    """Return what diagnoses; files of a surrogate and of a spread are read before any log."""
-    if method not in METHODS:
-        raise unknown("method", method, METHODS, "--method")
-    if method == "model":
-        if given is not None:
-            raise InputError("--surrogate: serves --method surrogate and both")
-        if spread is not None and not isinstance(spread, LearnedSpread):
-            spread = LearnedSpread.load(spread)
-        return partial(by_model, spread=spread)
-    if spread is not None:
-        raise InputError("--spread: serves --method model")
-    from elevon.diagnose.surrogate import (
-        Surrogate,
-        diagnose_by_both,
-        diagnose_by_surrogate,
-        shipped,
-    )
-
-    if not isinstance(given, Surrogate):
-        given = shipped() if given is None else Surrogate.load(given)
-    by = diagnose_by_surrogate if method == "surrogate" else diagnose_by_both
-    return partial(by, surrogate=given)
 
 
 def monitor(

@@ -184,15 +184,15 @@ class OpenQuestion(Plain):
         The sets of faults that it lists.
     detectable : dict of str to float
         The faults that it scored.
-    method : str
-        By which it was made.
+    prior : dict of str to float
+        Of a diagnosis by learnt classes: the share of each fault in what was learnt.
     others : dict
         All else.
     """
 
     hypotheses: tuple[Explanation, ...]
     detectable: dict[str, float]
-    method: str = "model"
+    prior: dict[str, float] = field(default_factory=dict)
     others: Annotated[dict[str, Any], REMAINDER] = field(default_factory=dict)
 
 
@@ -227,8 +227,8 @@ class Answered:
         seen = {*read.detectable, *chain.from_iterable(possible)}
         candidates = [c for c in candidates if c.key in seen]
         prior = {p.keys: p.weight for p in Belief.prior(candidates).possible}
-        if read.method == "surrogate":
-            prior = {keys: _trained(len(keys)) for keys in prior}
+        if read.prior:
+            prior = {keys: _learnt_share(keys, read.prior) for keys in prior}
         remaining = max(1.0 - sum(p.weight for p in possible.values()), _LEAST)
         return cls(possible, remaining, frozenset(c.key for c in candidates), prior)
 
@@ -240,14 +240,9 @@ class Answered:
         return self.remaining / sum(w for k, w in self.prior.items() if k not in self.possible)
 
 
-def _trained(count: int) -> float:
-    """Share of one set of so many faults among the runs that a surrogate is trained on."""
-    from elevon.diagnose.surrogate.population import FAULTS, HEALTHY, SINGLE
-    from elevon.diagnose.surrogate.table import FAULTY_DAYS, HEALTHY_DAYS
-
-    share = (HEALTHY, SINGLE, 1.0 - HEALTHY - SINGLE)[count] / math.comb(len(FAULTS), count)
-    faulty = FAULTY_DAYS / (FAULTY_DAYS + HEALTHY_DAYS)
-    return faulty * share + (0.0 if count else 1.0 - faulty)
+def _learnt_share(keys: Sequence[str], prior: Mapping[str, float]) -> float:
+    """Return the share of a set of faults in what was learnt, as if they came independently."""
+    return math.prod(p if key in keys else 1.0 - p for key, p in prior.items()) or _LEAST
 
 
 def _possible(item: Explanation, known: Sequence[str]) -> Possible:

@@ -193,7 +193,10 @@ class Diagnosis(Result):
     made_by : str
         Version of Elevon.
     method : str
-        ``model``, ``surrogate`` or ``both``.
+        ``model``, or ``learned``: by classes that were learnt.
+    prior : mapping of str to float
+        Of classes that were learnt: the share of the learnt logs that have each, by
+        ``KIND@PLACE``.
     draw : callable or None
         Gives the signals over those of the model, for its page.
     """
@@ -221,6 +224,7 @@ class Diagnosis(Result):
     baselines: tuple[str, ...] = ()
     made_by: str = ""
     method: str = "model"
+    prior: Mapping[str, float] = field(default_factory=dict)
     draw: Annotated[Callable[[], Sequence[Traces]] | None, WORKING] = field(
         default=None, compare=False, repr=False
     )

@@ -1,4 +1,4 @@
-"""Spread from day to day and mismatch of model and machine: what is known of them, and the file.
+"""Spread from day to day and mismatch of model and machine: what is known of them.
 
 Each is a factor of a variance that the package states: scaled inverse chi-square, worth so many
 runs. A threshold by draws includes what is not known of it.
@@ -6,21 +6,15 @@ runs. A threshold by draws includes what is not known of it.
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.draws import chi_square, uniform
-from elevon.documents import Document, read_toml
-from elevon.errors import FormatError
-from elevon.files import write_text
 
 DEGREES = 10.0  # ASSUMED: worth of the stated spread, and of the stated mismatch, in runs
 #: ASSUMED: the same of a feature by itself, beside the factor that all features have in common.
@@ -29,8 +23,6 @@ STATED = 20.0
 #: one baseline decides; a factor below one is none, as the stated deviations are least ones.
 _FACTORS = np.geomspace(1.0, 100.0, 61)
 _FAR = 3.0  # ASSUMED: as `STATED`, of an offset: one feature that is far off is no matter of all
-FORMAT = "elevon-spread"
-_VERSION = 2
 _ENDS = (0.05, 0.95)
 _INTERVAL_DRAWS = 4000  # draws of an interval that is printed
 
@@ -260,67 +252,31 @@ class LearnedSpread:
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         rows = {
-            name: {
-                "days": row.days.value, "days_runs": row.days.runs, "worth": row.worth,
-                "mismatch": row.mismatch.value, "mismatch_runs": row.mismatch.runs,
-            }
+            name: [row.days.value, row.days.runs, row.mismatch.value, row.mismatch.runs, row.worth]
             for name, row in self.features.items()
-        }  # fmt: skip
+        }
         return {
-            "format": FORMAT, "version": _VERSION, "actuator": self.actuator, "logs": self.logs,
-            "units": self.units, "days": self.days,
+            "actuator": self.actuator, "logs": self.logs, "units": self.units, "days": self.days,
             "held_out": [list(row) for row in self.held_out], "features": rows,
         }  # fmt: skip
 
-    def save(self, path: str | os.PathLike[str], *, force: bool = False) -> Path:
-        """Write it as TOML.
-
-        Raises
-        ------
-        OutputExistsError
-            The file is there, and not `force`.
-        """
-        data = self.to_dict()
-        rows = data.pop("features")
-        lines = [
-            "# Mean squares over the variances that the package states, and their runs.",
-            "# held_out: test, unit (of one unit: day), chance alone, with one baseline.",
-        ]
-        lines += [f"{name} = {json.dumps(value)}" for name, value in data.items()]
-        for name, row in rows.items():
-            values = ", ".join(f"{key} = {value!r}" for key, value in row.items())
-            lines.append(f"features.{json.dumps(name)} = {{ {values} }}")
-        return write_text(path, "\n".join(lines) + "\n", force=force)
-
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> LearnedSpread:
-        """Read a file that `save` wrote.
+    def from_dict(cls, data: Mapping[str, Any]) -> LearnedSpread:
+        """Read what `to_dict` gave.
 
         Raises
         ------
-        FormatError
-            Another file, or a value that is none of a spread.
+        ValueError, TypeError, KeyError
+            A key is missing, or a value is none of a spread.
         """
-        document = read_toml(Path(path))
-        data = dict(document.data)
-        if data.pop("format", None) != FORMAT:
-            raise FormatError(f"{path}: no file of elevon learn-spread (format = {FORMAT!r})")
-        version = data.pop("version", None)
-        if version != _VERSION:
-            raise FormatError(
-                f"{path}: elevon learn-spread wrote it in version {version!r} of its format, not "
-                f"{_VERSION}: learn it again"
-            )
-        try:
-            rows = data.pop("features", {})
-            features = {name: _row(document, name, row) for name, row in rows.items()}
-            held_out = tuple(
-                HeldOutLog(int(test), int(group), float(alone), float(based))
-                for test, group, alone, based in data.pop("held_out")
-            )
-            return cls(features=features, held_out=held_out, **data)
-        except (TypeError, AttributeError, KeyError, ValueError) as error:
-            raise FormatError(f"{path}: a key is missing or of another kind: {error}") from None
+        held_out = tuple(
+            HeldOutLog(int(test), int(group), float(alone), float(based))
+            for test, group, alone, based in data["held_out"]
+        )
+        return cls(
+            str(data["actuator"]), int(data["logs"]), int(data["units"]), int(data["days"]),
+            {str(name): _row(name, row) for name, row in data["features"].items()}, held_out,
+        )  # fmt: skip
 
 
 def variances(
@@ -374,12 +330,11 @@ def needed(rate: float) -> int:
     return max(math.ceil(1.0 / rate - 1e-9) - 1, 1)
 
 
-def _row(document: Document, name: str, row: Mapping[str, float]) -> FeatureSpread:
-    keys = ("days", "days_runs", "mismatch", "mismatch_runs", "worth")
-    days, runs, mismatch, units, worth = (float(row[key]) for key in keys)
+def _row(name: str, row: Sequence[float]) -> FeatureSpread:
+    days, runs, mismatch, units, worth = map(float, row)
     known = all(math.isfinite(v) and v >= 0.0 for v in (days, runs, mismatch, units))
-    if len(row) != len(keys) or not known or not (math.isfinite(worth) and worth > 0.0):
-        place = document.place(("features", name))
-        raise FormatError(f"{place}: mean squares and runs must be nought or more, worth above it, "
-                          f"not {row}")  # fmt: skip
+    if not known or not (math.isfinite(worth) and worth > 0.0):
+        raise ValueError(
+            f"{name}: mean squares and runs must be nought or more, worth above it, not {row}"
+        )
     return FeatureSpread(VarianceFactor(days, runs), VarianceFactor(mismatch, units), worth)

@@ -27,6 +27,7 @@ _PACE = 0.2  # by which their paces may differ
 _SLOW = 0.02  # s of the means that the pace is read from
 _SET_POINT = "speed_ref"
 _OF_COMMAND = ("position error", "tracking")
+_ROOM = 1.1  # over the largest difference among runs of a plan that varies the motion. ASSUMED
 _SOONER = 0.3  # of its length that a log may be shorter or longer: benches are started by hand
 
 
@@ -54,16 +55,57 @@ class LoggedMotion:
     pace: float
     seconds: float
 
-    def apart(self, command: Floats, pace: float, seconds: float) -> str:
-        """Say how the motion differs from another, or nothing."""
-        if abs(self.seconds / seconds - 1.0) > _SOONER:
-            return f"lasts {self.seconds:.3g} s after its onset, not {seconds:.3g} s"
-        off = float(np.sqrt(np.mean((self.command - command) ** 2)))
-        size = float(np.ptp(command))
-        if off > _ALIKE * size:
-            return f"its command is off by {off / size:.0%} of the range (RMS)"
-        if abs(self.pace / pace - 1.0) > _PACE:
-            return f"it moves at {self.pace / pace:.2g} times the pace"
+
+@dataclass(frozen=True)
+class KnownMotion:
+    """The motion that was learnt, and how far a log may be from it.
+
+    Attributes
+    ----------
+    command : ndarray, shape (200,)
+        As `LoggedMotion` has it.
+    pace, seconds : float
+        Of it [1/s, s].
+    off : float
+        RMS difference of two commands, over the range of the learnt one.
+    faster, longer : float
+        Relative difference of pace and length.
+    """
+
+    command: Floats
+    pace: float
+    seconds: float
+    off: float = _ALIKE
+    faster: float = _PACE
+    longer: float = _SOONER
+
+    @classmethod
+    def spanning(cls, items: Sequence[LoggedMotion]) -> KnownMotion:
+        """Return the middle of motions that a plan varies, with as much room as they need."""
+        command = np.median([item.command for item in items], axis=0)
+        pace, seconds = (
+            float(np.median([getattr(item, name) for item in items]))
+            for name in ("pace", "seconds")
+        )
+        middle = cls(command, pace, seconds)
+        rows = np.array([middle.differences(item) for item in items])
+        least = (_ALIKE, _PACE, _SOONER)
+        return cls(command, pace, seconds, *np.maximum(_ROOM * rows.max(axis=0), least).tolist())
+
+    def differences(self, item: LoggedMotion) -> tuple[float, float, float]:
+        """Return what `off`, `faster` and `longer` bound."""
+        off = float(np.sqrt(np.mean((item.command - self.command) ** 2)) / np.ptp(self.command))
+        return off, abs(item.pace / self.pace - 1.0), abs(item.seconds / self.seconds - 1.0)
+
+    def refusal(self, item: LoggedMotion) -> str:
+        """Return how a log differs from the motion; empty where it is of the motion."""
+        off, faster, longer = self.differences(item)
+        if longer > self.longer:
+            return f"lasts {item.seconds:.3g} s after its onset, not {self.seconds:.3g} s"
+        if off > self.off:
+            return f"its command is off by {off:.0%} of the range (RMS)"
+        if faster > self.faster:
+            return f"it moves at {item.pace / self.pace:.2g} times the pace"
         return ""
 
 
@@ -103,8 +145,10 @@ def motion_of(log: Log, pole_pairs: float | None = None) -> LoggedMotion:
     return LoggedMotion(log.name, values, quantiles, pace, seconds)
 
 
-def motions(logs: Sequence[Log], pole_pairs: float | None = None) -> tuple[LoggedMotion, ...]:
-    """Compute the numbers of logs that must be of one motion.
+def motions(
+    logs: Sequence[Log], pole_pairs: float | None = None
+) -> tuple[tuple[LoggedMotion, ...], KnownMotion]:
+    """Return the numbers of logs that must be of one motion, and that motion: the first log's.
 
     Raises
     ------
@@ -112,7 +156,8 @@ def motions(logs: Sequence[Log], pole_pairs: float | None = None) -> tuple[Logge
         As `motion_of`; a log of another motion than the first.
     """
     out = tuple(motion_of(log, pole_pairs) for log in logs)
+    known = KnownMotion(out[0].command, out[0].pace, out[0].seconds)
     for item in out[1:]:
-        if text := item.apart(out[0].command, out[0].pace, out[0].seconds):
+        if text := known.refusal(item):
             raise InputError(f"{item.name} is of another motion than {out[0].name}: {text}")
-    return out
+    return out, known

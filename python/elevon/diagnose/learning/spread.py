@@ -120,7 +120,7 @@ def learned_spread(
         `progress` returned False.
     """
     if not logs:
-        raise InputError("learn-spread needs at least one log of a healthy unit")
+        raise InputError("the spread needs at least one log of a healthy unit")
     pairs = [("", str(k)) for k in range(len(logs))] if days is None else list(days)
     if len(pairs) != len(logs):
         raise InputError(f"{len(logs)} logs, but units and days of {len(pairs)}")

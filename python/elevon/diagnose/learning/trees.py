@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 
 if TYPE_CHECKING:
-    from sklearn.ensemble import GradientBoostingClassifier
+    from sklearn.ensemble import GradientBoostingClassifier, GradientBoostingRegressor
 
 _NAMES = ("feature", "threshold", "left", "right", "value", "roots")
 _WAYS = ("left", "right")
@@ -33,7 +33,7 @@ class Trees:
     value : ndarray, shape (n,)
         Of leaves.
     roots : ndarray of int, shape (r, c)
-        First nodes, by round and class; one column for two classes.
+        First nodes, by round and column.
     """
 
     feature: npt.NDArray[np.int64]
@@ -44,7 +44,7 @@ class Trees:
     roots: npt.NDArray[np.int64]
 
     def scores(self, values: Floats) -> Floats:
-        """Return scores of rows, shape (n, k) to (n, c): logits but for a constant."""
+        """Return the sums of the trees of each column: rows of shape (n, k) to (n, c)."""
         values = values.astype(np.float32)  # as the library compares them
         at = np.broadcast_to(self.roots.ravel(), (len(values), self.roots.size))
         rows = np.arange(len(values))[:, None]
@@ -54,10 +54,7 @@ class Trees:
             if np.array_equal(following, at):
                 break
             at = following
-        total = self.value[at].reshape(len(values), *self.roots.shape).sum(axis=1)
-        if total.shape[1] == 1:
-            total = np.hstack((np.zeros_like(total), total))
-        return np.asarray(total)
+        return np.asarray(self.value[at].reshape(len(values), *self.roots.shape).sum(axis=1))
 
     def arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """Return what a file holds of it: children by how far behind their node they stand."""
@@ -103,8 +100,10 @@ class Trees:
         )  # fmt: skip
 
     @classmethod
-    def of(cls, model: GradientBoostingClassifier) -> Trees:
-        """Return the trees of a model fitted with ``init="zero"``; of two classes the first has 0.
+    def of(cls, model: GradientBoostingClassifier | GradientBoostingRegressor) -> Trees:
+        """Return the trees of a model that was fitted with ``init="zero"``.
+
+        A classifier of two classes has one column: the logit of the second.
 
         Raises
         ------
@@ -126,25 +125,11 @@ class Trees:
         return cls.build({n: np.concatenate(rows) for n, rows in nodes.items()} | {"roots": roots})
 
     @classmethod
-    def of_histograms(cls, columns: Sequence[Sequence[npt.NDArray[Any]]]) -> Trees:
-        """Return the trees of models by histograms: of each column those of its rounds.
-
-        Columns of fewer rounds than others have a leaf of zero in their place.
-        """
-        nodes: dict[str, list[npt.NDArray[np.generic]]] = {n: [np.zeros(1)] for n in _NAMES[:5]}
-        roots = np.zeros((max([len(c) for c in columns] + [1]), len(columns)), dtype=np.int64)
-        first = 1
-        for k, trees in enumerate(columns):
-            for round_, tree in enumerate(trees):
-                leaf, at = tree["is_leaf"].astype(bool), np.arange(len(tree))
-                nodes["feature"].append(np.where(leaf, 0, tree["feature_idx"]))
-                nodes["threshold"].append(np.where(leaf, 0.0, tree["num_threshold"]))
-                nodes["left"].append(first + np.where(leaf, at, tree["left"]))
-                nodes["right"].append(first + np.where(leaf, at, tree["right"]))
-                nodes["value"].append(np.where(leaf, tree["value"], 0.0))
-                roots[round_, k] = first
-                first += len(tree)
-        return cls.build({n: np.concatenate(rows) for n, rows in nodes.items()} | {"roots": roots})
+    def constant(cls, rounds: int) -> Trees:
+        """Return so many trees of one column that are nought everywhere."""
+        none = np.zeros(1)
+        whole = dict.fromkeys(_NAMES[:5], none) | {"roots": np.zeros((rounds, 1))}
+        return cls.build(whole)
 
     @classmethod
     def joined(cls, parts: Sequence[Trees]) -> Trees:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.special import stdtr
 
 from elevon.arrays import Floats
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.errors import InputError, RangeError, did_you_mean
 from elevon.reproduce.cranfield.data import CONDITIONS, CranfieldData
 from elevon.reproduce.cranfield.features import TRANSFER

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from elevon.diagnose.learning.classify import share_interval
+from elevon.diagnose.learning.fit import share_interval
 from elevon.progress import Progress
 from elevon.report import Check, all_passed
 from elevon.reproduce.cranfield.data import (

@@ -1,11 +1,11 @@
-"""Baseline scores on the benchmark set: what a forest of trees makes of the features."""
+"""Baseline scores on the benchmark set: what `elevon learn` makes of the runs."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.benchmark.make import ACTUATORS, BENCHMARK
+from elevon.campaign import load_campaign
+from elevon.diagnose.learning.examples import Examples, examples_of_dataset, pole_pairs_of
+from elevon.diagnose.learning.fit import learned_classes
+from elevon.diagnose.learning.model import LearnedClasses
+from elevon.diagnose.learning.motion import KnownMotion
 from elevon.errors import InputError
 from elevon.files import read_regular, write_text
+from elevon.report import Check, verdict
+from studies.benchmark_set.make import ACTUATORS, BENCHMARK
 
 SCORES = "scores.json"
 
 #: A fault counts as present from this part of its severity at the end of life on.
 _PRESENT = 0.2
-_TREES, _RESAMPLES = 200, 200
+_RESAMPLES = 200
 
 
 @dataclass(frozen=True)
@@ -38,7 +44,7 @@ class Score:
         Area under the receiver's curve of the detection, and 95 % interval over resampled units;
         None where all runs are of one kind.
     null, age : float or None
-        The same area of a forest whose training labels were dealt at random, and of the age alone:
+        The same area of what was learnt of labels dealt at random, and of the age alone:
         what grows late goes with everything else that does.
     error, error_interval : float, list of float, or None
         Root mean square error of the severity over that of the training runs' mean: below 1 is
@@ -59,17 +65,24 @@ class Score:
 
 
 @dataclass(frozen=True)
+class BenchmarkScores:
+    """All scores, and how many runs failed."""
+
+    scores: tuple[Score, ...]
+    failed: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON form."""
+        checks = [Check("runs that failed", float(self.failed), 0.0, "")]
+        return {**verdict(checks), "rows": [vars(score) for score in self.scores]}
+
+
+@dataclass(frozen=True)
 class _Part:
-    """Features, severities over the largest, units and ages of some runs."""
+    """Runs of one part: their numbers, severities over the largest, and ages."""
 
-    features: Floats
-    severity: Floats
-    unit: npt.NDArray[np.int64]
+    examples: Examples
     age: Floats
-
-    @property
-    def present(self) -> npt.NDArray[np.bool_]:
-        return np.asarray(self.severity > _PRESENT)
 
 
 def score_benchmark(
@@ -78,18 +91,17 @@ def score_benchmark(
     seed: int = 0,
     progress: Callable[[float], object] | None = None,
 ) -> list[Score]:
-    """Train a random forest on each actuator's training units and score it on the others.
+    """Learn from each actuator's training units and score what was learnt on the others.
 
-    The forests see the features alone (those that at least nine of ten training runs have; what is
-    missing is the median of the training runs). Nothing is tuned. ``scores.json`` is written into
-    the folder.
+    It sees the numbers of the logs alone, without baselines. ``scores.json`` is written into the
+    folder.
 
     Parameters
     ----------
     folder : path
         As `make_benchmark` made it.
     seed : int
-        Of the forests and the resampled units.
+        Of boosting and of the resampled units.
     progress : callable, optional
         Called with the done fraction.
 
@@ -108,28 +120,28 @@ def score_benchmark(
             progress((place + 1) / len(ACTUATORS))
     rows = [vars(score) for score in scores]
     about = json.loads(read_regular(root / BENCHMARK, 2**24))
-    content = {"version": about["version"], "seed": seed, "trees": _TREES, "scores": rows}
+    content = {"version": about["version"], "seed": seed, "scores": rows}
     write_text(root / SCORES, json.dumps(content, indent=1) + "\n", force=True)
     return scores
 
 
 def _scored(root: Path, name: str, seed: int) -> Iterator[Score]:
-    faults, ends, parts = _read(root / name)
-    parts["shifted"] = _read(root / f"{name}-shifted", faults, ends)[2]["shifted"]
-    train = parts["train"]
-    able = np.isfinite(train.features).mean(axis=0) >= 0.9
-    middle = np.nanmedian(train.features[:, able], axis=0)
+    parts, motion, ends = _read(root / name)
+    other, _, _ = _read(root / f"{name}-shifted", parts["train"].examples, ends)
+    parts["shifted"] = other["shifted"]
+    train = parts["train"].examples
     generator = np.random.default_rng(seed)
-    models = _models(train, able, middle, seed, generator)
+    dealt = generator.permutation(len(train.values))
+    shuffled = replace(train, present=train.present[dealt], severity=train.severity[dealt])
+    learned, null = (learned_classes(e, motion, seed=seed)[0] for e in (train, shuffled))
     typical = train.severity.mean(axis=0)
     for part in ("validation", "test", "shifted"):
-        data = parts[part]
-        inputs = _filled(data.features[:, able], middle)
-        chance, null = (_chances(model, inputs) for model in models[:2])
-        guess = np.asarray(models[2].predict(inputs)).reshape(len(inputs), -1)
-        for k, fault in enumerate(faults):
-            draws = _resampled(data.unit, generator)
-            present, truth = data.present[:, k], data.severity[:, k]
+        examples, age = parts[part].examples, parts[part].age
+        chance, guess = _said(learned, examples.values)
+        at_random, _ = _said(null, examples.values)
+        for k, fault in enumerate(examples.kinds):
+            draws = _resampled(examples.unit, generator)
+            present, truth = examples.present[:, k], examples.severity[:, k]
             ranked = (present, chance[:, k])
             missed = ((guess[:, k] - truth) ** 2, (typical[k] - truth) ** 2)
             yield Score(
@@ -140,62 +152,39 @@ def _scored(root: Path, name: str, seed: int) -> Iterator[Score]:
                 int(present.sum()),
                 _auc(*ranked),
                 _interval(_auc, ranked, draws),
-                _auc(present, null[:, k]),
-                _auc(present, data.age),
+                _auc(present, at_random[:, k]),
+                _auc(present, age),
                 _ratio(*missed),
                 _interval(_ratio, missed, draws),
             )
 
 
+def _said(learned: LearnedClasses, values: Floats) -> tuple[Floats, Floats]:
+    """Return the probability of each fault and its expected severity, shape (runs, faults)."""
+    says = [learned.says(row[None]) for row in values]
+    chance = np.array([[o.probability[kind] for kind in learned.kinds] for o in says])
+    size = np.array([[o.severity.get(kind, (0.0,))[0] for kind in learned.kinds] for o in says])
+    return chance, chance * size
+
+
 def _read(
-    folder: Path, faults: list[str] | None = None, ends: Floats | None = None
-) -> tuple[list[str], Floats, dict[str, _Part]]:
-    """Return the faults, their severities at the end of life, and the parts of one campaign."""
-    from elevon.campaign import load_campaign
-
+    folder: Path, like: Examples | None = None, ends: Floats | None = None
+) -> tuple[dict[str, _Part], KnownMotion, Floats]:
+    """Return the parts of one campaign, its motion, and the severities at the end of life."""
     ds = load_campaign(folder)
-    runs, features = ds.runs.to_arrow(), ds.features.to_arrow()
-    faults = faults or [fault["name"] for fault in ds.manifest.faults]
-    severity = np.column_stack([runs[name].to_numpy() for name in faults])
-    ends = severity.max(axis=0) if ends is None else ends
-    names = [name for name in features.column_names if name != "run"]
-    values = np.column_stack([features[name].to_numpy() for name in names])
-    split, unit = np.array(runs["split"].to_pylist()), runs["unit"].to_numpy()
-    age = runs["age"].to_numpy()
-    ended = np.isin(runs["status"].to_pylist(), ["ok", "tripped"])
-    parts = {}
-    for part in dict.fromkeys(split.tolist()):
-        rows = (split == part) & ended
-        parts[part] = _Part(values[rows], severity[rows] / ends, unit[rows], age[rows])
-    return faults, ends, parts
-
-
-def _models(
-    train: _Part, able: Any, middle: Floats, seed: int, generator: np.random.Generator
-) -> list[Any]:
-    """Return the classifier, one trained on labels dealt at random, and the regressor."""
-    from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
-
-    inputs = _filled(train.features[:, able], middle)
-    dealt = generator.permutation(len(inputs))
-    options = {"n_estimators": _TREES, "random_state": seed, "min_samples_leaf": 2}
-    return [
-        RandomForestClassifier(**options).fit(inputs, train.present),
-        RandomForestClassifier(**options).fit(inputs, train.present[dealt]),
-        RandomForestRegressor(**options).fit(inputs, train.severity),
-    ]
-
-
-def _filled(values: Floats, middle: Floats) -> Floats:
-    return np.where(np.isfinite(values), values, middle)
-
-
-def _chances(model: Any, inputs: Floats) -> Floats:
-    """Return the probability of each fault, shape (runs, faults)."""
-    columns = []
-    for chance, classes in zip(model.predict_proba(inputs), model.classes_, strict=True):
-        columns.append(chance[:, 1] if len(classes) == 2 else np.full(len(inputs), classes[0]))
-    return np.column_stack(columns).astype(np.float64)
+    examples, motion, _, numbers = examples_of_dataset(ds, pole_pairs_of(ds))
+    ends = examples.severity.max(axis=0) if ends is None else ends
+    share = examples.severity / ends
+    examples = replace(
+        examples, present=share > _PRESENT, severity=np.where(share > 0.0, share, 0.0)
+    )
+    if like is not None:
+        at = [examples.names.index(name) for name in like.names]
+        examples = replace(examples, names=like.names, values=examples.values[:, at])
+    table = ds.runs.to_pandas().set_index("run").loc[numbers]
+    split, age = np.array(table["split"].tolist()), table["age"].to_numpy(dtype=np.float64)
+    rows = {part: np.flatnonzero(split == part) for part in dict.fromkeys(split.tolist())}
+    return {p: _Part(examples.take(r), age[r]) for p, r in rows.items()}, motion, ends
 
 
 def _auc(present: Any, chance: Any) -> float | None:
@@ -214,7 +203,7 @@ def _ratio(missed: Any, typical: Any) -> float | None:
     return float(np.sqrt(np.mean(missed) / scale)) if scale > 0.0 else None
 
 
-def _resampled(unit: npt.NDArray[np.int64], generator: np.random.Generator) -> list[Any]:
+def _resampled(unit: npt.NDArray[np.generic], generator: np.random.Generator) -> list[Any]:
     """Return rows of units drawn with replacement: runs of one unit are not independent."""
     units = np.unique(unit)
     rows = {number: np.flatnonzero(unit == number) for number in units}

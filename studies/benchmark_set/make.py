@@ -139,7 +139,7 @@ def plan_text(name: str, units: int, ages: int, seed: int, *, shifted: bool = Fa
 
     if name not in ACTUATORS:
         raise unknown("actuator of the benchmark", name, ACTUATORS)
-    plans = files("elevon.benchmark") / "plans"
+    plans = files("studies.benchmark_set") / "plans"
     text = (plans / f"{name}.toml").read_text("utf-8")
     voltage = _voltage(name)
     text = text.replace("@VOLTAGE_LOW@", f"{voltage * (1.0 - _VOLTAGE):.6g}")
@@ -222,7 +222,7 @@ def _card(about: Mapping[str, Any]) -> str:
         f"| `{c['folder']}` | {c['runs']} | {', '.join(f'`{f}`' for f in c['faults'])} |"
         for c in about["campaigns"]
     ]
-    text = (files("elevon.benchmark") / "plans" / "README.md").read_text("utf-8")
+    text = (files("studies.benchmark_set") / "plans" / "README.md").read_text("utf-8")
     for key in ("version", "seed", "units", "ages", "elevon"):
         text = text.replace(f"@{key.upper()}@", str(about[key]))
     return text.replace("@CAMPAIGNS@", "\n".join(rows))

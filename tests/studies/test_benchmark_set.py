@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from elevon import InputError
-from elevon.benchmark import make_benchmark
-from elevon.benchmark.make import ACTUATORS, _resolved, plan_text
-from elevon.benchmark.score import _auc, _interval, _resampled
+from elevon.campaign.verify import verify
+from elevon.report import all_passed
+from studies.benchmark_set import make_benchmark, score_benchmark
+from studies.benchmark_set.make import ACTUATORS, _resolved, plan_text
+from studies.benchmark_set.score import _auc, _interval, _resampled
 
 
 @pytest.mark.parametrize("name", ACTUATORS)
@@ -55,18 +57,15 @@ def test_too_few_runs_and_another_set_are_refused(tmp_path):
 
 
 @pytest.mark.long
-def test_the_whole_set_is_made_scored_and_verified(elevon_cli, tmp_path):
-    made = elevon_cli("dataset", "make", "benchmark", "--out", "set", "--runs", 240, "--json")
-    assert made.code == 0
-    scores = made.json["scores"]
-    assert {row["part"] for row in scores} == {"validation", "test", "shifted"}
-    assert {row["actuator"] for row in scores} == set(ACTUATORS)
+def test_the_whole_set_is_made_scored_and_verified(tmp_path):
+    made = make_benchmark(tmp_path / "set", runs=240)
+    assert not made.failed
+    scores = score_benchmark(tmp_path / "set")
+    assert {row.part for row in scores} == {"validation", "test", "shifted"}
+    assert {row.actuator for row in scores} == set(ACTUATORS)
     for name in ACTUATORS:
-        assert elevon_cli("dataset", "verify", f"set/{name}").code == 0
-    again = elevon_cli("dataset", "score", "set", "--json").json
-    assert again["scores"] == scores
-    hashes = [item["data_hash"] for item in made.json["campaigns"]]
-    other = elevon_cli(
-        "dataset", "make", "benchmark", "--out", "other", "--runs", 240, "--no-scores", "--json"
-    )
-    assert [item["data_hash"] for item in other.json["campaigns"]] == hashes
+        assert all_passed(verify(tmp_path / "set" / name))
+    assert score_benchmark(tmp_path / "set") == scores
+    other = make_benchmark(tmp_path / "other", runs=240)
+    hashes = [[c["data_hash"] for c in m.about["campaigns"]] for m in (made, other)]
+    assert hashes[0] == hashes[1]
