@@ -60,8 +60,7 @@ _RUNS = (
     ("sensor.current.gain_b", "0.993", "1.007"),
 )
 _RECORD = (
-    "command,encoder_position,resolver_position,resolver_speed,speed_ref,current_ref,"
-    "current_d_meas,current_q_meas"
+    "command,encoder_position,resolver_position,resolver_speed,speed_ref,current_ref,current_q_meas"
 )
 
 
@@ -110,7 +109,7 @@ class LearnedCampaign:
 def plan_text(units: int, judged: int, fidelity: str, seed: int) -> str:
     """Return the campaign's plan (TOML)."""
     total = units + judged
-    voltage = ",voltage_q_meas" if fidelity == "high" else ""
+    switching = ",current_d_meas,voltage_q_meas" if fidelity == "high" else ""
     steps = (
         '[parameters]\nsolver.method = "semi_implicit"\nsolver.step = "5 us"\n'
         'control.derivative_filter = "100"\n\n'
@@ -129,7 +128,7 @@ def plan_text(units: int, judged: int, fidelity: str, seed: int) -> str:
     )
     return (
         f'name = "learned"\nactuator = "torino-rotary"\nfidelity = "{fidelity}"\n'
-        f'record = ["{_RECORD}{voltage}@400 Hz"]\nsplit_seed = {seed + 1}\n'
+        f'record = ["{_RECORD}{switching}@400 Hz"]\nsplit_seed = {seed + 1}\n'
         'allow_not_acting = true\n\n[scenario]\nduration = "20 s"\n[[scenario.command.terms]]\n'
         'kind = "sine"\namplitude = "7 deg"\nbias = "10 deg"\nfrequency = "0.2 Hz"\n\n'
         f"{steps if fidelity == 'high' else ''}"

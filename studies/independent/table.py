@@ -19,7 +19,7 @@ kHz. Each unit is calibrated on a log of each of three tests; all other logs are
 Intervals are of 95 %. Alarms are `faulty` and `unknown_fault`. Gated is `model_does_not_fit`. A
 cause moves the log where one feature lies beyond five deviations of the unit's healthy days.
 Unknown is `unknown_fault`, `model_does_not_fit`, a refused log, or `p_other` of one half and
-more. `spread learnt`: by `learn-spread` on {learned} other days of each test of the same unit. The
+more. `spread learnt`: by `elevon learn` on {learned} other days of each test of the same unit. The
 screw's and the gear's logs are the package's own switching model's, so that part is no
 independent judgement.
 

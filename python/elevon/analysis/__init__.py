@@ -1,4 +1,4 @@
-"""What campaigns teach: effects of factors on a response, and surrogates of it."""
+"""What campaigns teach: effects of factors on a response."""
 
 from elevon.analysis.effects import EffectEstimate, Effects, effects_of
 from elevon.analysis.response import CampaignResponse, read_response

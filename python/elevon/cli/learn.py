@@ -67,7 +67,9 @@ def _print(result: LearnedModel, path: Path) -> None:
     far = sorted(spread["features"].items(), key=lambda row: -abs(row[1]["days"] - 1.0))
     rows = [(name, *(f"{x:.2f}" for x in values.values())) for name, values in far]
     columns = ("feature", "day to day", "low", "high", "mismatch", "low", "high")
-    print_table(columns, rows, title="deviations over those stated, with 90 % intervals")
+    counts = ", ".join(f"{spread[n]} {n if spread[n] != 1 else n[:-1]}" for n in ("days", "units"))
+    title = f"{counts}: deviations over those stated, with 90 % intervals"
+    print_table(columns, rows, title=title)
     listed([result.spread.threshold_text(_RATE)])
 
 

@@ -12,6 +12,7 @@ from elevon.cli.shell import styled
 
 #: What judges Elevon itself stands outside the package.
 STUDIES = (
+    "benchmark-set",
     "diagnosis-limits",
     "diagnosis-optimisers",
     "fault-limits",
@@ -19,6 +20,7 @@ STUDIES = (
     "independent",
     "inspection-error",
     "learned",
+    "learned-campaign",
     "monitor-delay",
     "monitor-hours",
     "next-test",

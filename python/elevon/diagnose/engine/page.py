@@ -95,7 +95,7 @@ def _causes(report: Report, result: Diagnosis) -> None:
 
 
 def _by_network(result: Diagnosis) -> bool:
-    """Whether nothing is known of what a cause accounts for: the surrogate has no model."""
+    """Whether nothing is known of what a cause accounts for: learnt classes have no model."""
     return all(math.isnan(m.explained) for m in result.features)
 
 
