@@ -27,7 +27,7 @@ _DRAWS = 20  # runs of a unit
 _RATE = 0.05  # of false alarms that is set
 _REPEATS = 200  # answers that are timed
 _LIMIT = 0.010  # s of an answer
-_HELD = 0.90  # of severities that their intervals must hold
+_COVERED = 0.90  # of severities that their intervals must hold
 _FAULTS = (
     ("backlash@transmission", "0.02 deg", "0.5 deg"),
     ("friction@transmission", "0.1", "1.2"),
@@ -88,14 +88,14 @@ class LearnedCampaign:
         out = [Check("an answer, median of 200", 1e3 * self.seconds, 1e3 * _LIMIT, "ms")]
         for row in self.rows:
             name = f"{row['baselines']} baselines"
-            rate, held = (
+            rate, covered = (
                 row["false_alarms"] / row["healthy"], row["covered"] / row["severities"]
             )  # fmt: skip
             # Three deviations of a share of so many runs, and of as many that set the threshold.
             room = 3.0 * np.sqrt(2.0 * _RATE * (1.0 - _RATE) / row["healthy"])
             out.append(Check(f"false alarms, {name}", rate, float(_RATE + room)))
-            least = _HELD - 3.0 * np.sqrt(2.0 * _HELD * (1.0 - _HELD) / row["severities"])
-            out.append(Check(f"severities in 90 %, {name}", held, float(least), at_least=True))
+            least = _COVERED - 3.0 * np.sqrt(2.0 * _COVERED * (1.0 - _COVERED) / row["severities"])
+            out.append(Check(f"severities in 90 %, {name}", covered, float(least), at_least=True))
         return out
 
     def to_dict(self) -> dict[str, Any]:

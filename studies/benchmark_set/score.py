@@ -137,8 +137,8 @@ def _scored(root: Path, name: str, seed: int) -> Iterator[Score]:
     typical = train.severity.mean(axis=0)
     for part in ("validation", "test", "shifted"):
         examples, age = parts[part].examples, parts[part].age
-        chance, guess = _said(learned, examples.values)
-        at_random, _ = _said(null, examples.values)
+        chance, guess = _answers(learned, examples.values)
+        at_random, _ = _answers(null, examples.values)
         for k, fault in enumerate(examples.kinds):
             draws = _resampled(examples.unit, generator)
             present, truth = examples.present[:, k], examples.severity[:, k]
@@ -159,7 +159,7 @@ def _scored(root: Path, name: str, seed: int) -> Iterator[Score]:
             )
 
 
-def _said(learned: LearnedClasses, values: Floats) -> tuple[Floats, Floats]:
+def _answers(learned: LearnedClasses, values: Floats) -> tuple[Floats, Floats]:
     """Return the probability of each fault and its expected severity, shape (runs, faults)."""
     says = [learned.says(row[None]) for row in values]
     chance = np.array([[o.probability[kind] for kind in learned.kinds] for o in says])

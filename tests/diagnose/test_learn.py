@@ -89,8 +89,8 @@ def test_a_unit_that_was_not_learnt_is_classed(unit, labelled, learned, tmp_path
             continue
         answer = elevon.diagnose(log, unit, model=path)
         if log is not base:
-            beside = elevon.diagnose(log, unit, base, model=path)
-            assert beside.best == answer.best
+            with_baseline = elevon.diagnose(log, unit, base, model=path)
+            assert with_baseline.best == answer.best
         if known.label == "healthy":
             assert answer.status == "healthy"
             continue
@@ -374,9 +374,9 @@ def test_a_data_set_has_its_own_labels(elevon_cli, tmp_path, unit):  # noqa: F81
     folder = tmp_path / "set"
     assert elevon_cli("campaign", "run", tmp_path / "plan.toml", "--out", folder).code == 0
     out = tmp_path / "model.npz"
-    told = elevon_cli("learn", folder, "--out", out, "--json")
-    assert told.code == 0, told.err
-    answer = json.loads(told.out)
+    result = elevon_cli("learn", folder, "--out", out, "--json")
+    assert result.code == 0, result.err
+    answer = json.loads(result.out)
     assert answer["holds"] == ["classes", "severities"]
     assert answer["logs"] == 64
     refused = elevon_cli("learn", folder, "--labels", tmp_path / "labels.csv", "--out", "x.npz")
@@ -391,9 +391,9 @@ def test_a_data_set_has_its_own_labels(elevon_cli, tmp_path, unit):  # noqa: F81
     run = int(np.flatnonzero(examples.present[:, 0] & ~examples.present[:, 1])[0])
     path = tmp_path / "run.parquet"
     ds.recording(run).save(path)
-    told = elevon_cli("diagnose", path, "--actuator", "torino-rotary", "--model", out, "--json")
-    assert told.code == 0, told.err
-    data = json.loads(told.out)
+    result = elevon_cli("diagnose", path, "--actuator", "torino-rotary", "--model", out, "--json")
+    assert result.code == 0, result.err
+    data = json.loads(result.out)
     assert data["method"] == "learned"
     assert data["best"]["faults"] == ["backlash@transmission"]
     cause = data["faults"][0]
@@ -415,9 +415,9 @@ def test_a_data_set_has_its_own_labels(elevon_cli, tmp_path, unit):  # noqa: F81
     ],
 )
 def test_commands_and_options_that_went_name_what_took_their_place(elevon_cli, words, text):  # noqa: F811
-    told = elevon_cli(*words)
-    assert told.code == 2
-    assert text in told.err
+    result = elevon_cli(*words)
+    assert result.code == 2
+    assert text in result.err
 
 
 @pytest.mark.parametrize("classes", [2, 3])

@@ -57,7 +57,7 @@ def learn(
         What is known of each log, or a table (CSV) with columns ``log``, ``label``, and ``unit``,
         ``condition``, ``severity``, ``healthy``, ``day`` where known. A label is ``healthy``,
         ``KIND@PLACE`` or a word. Without it all logs are healthy days of one unit. A data set has
-        its own labels.
+        its stage labels.
     actuator : Actuator, str or path, optional
         As `elevon.diagnose` will be given it: the spread of the healthy logs is learnt, too.
     pole_pairs : float, optional
@@ -85,7 +85,7 @@ def learn(
         pole_pairs = unit.parameters.value("motor.pole_pairs")
     if (data := as_dataset(logs)) is not None:
         if labels is not None:
-            raise InputError("--labels: a data set has its own labels")
+            raise InputError("--labels: a data set has its stage labels")
         return _learn_dataset(data, unit, pole_pairs, seed, progress)
     items = _listed(logs)
     if labels is None or not isinstance(labels, (str, os.PathLike)):
@@ -118,14 +118,14 @@ def learn_logs(
         )
     if actuator is not None and healthy:
         days = [(known[k].unit, known[k].day or str(k)) for k in healthy]
-        own = part(progress, 0.0, _SPREAD if several else 1.0)
-        spread = learned_spread([logs[k] for k in healthy], actuator, days, own)
+        stage = part(progress, 0.0, _SPREAD if several else 1.0)
+        spread = learned_spread([logs[k] for k in healthy], actuator, days, stage)
         report["spread"] = spread_report(spread)
     if several:
         examples, motion = examples_of_logs(logs, known, pole_pairs)
-        own = part(progress, 0.0 if spread is None else _SPREAD, 1.0)
+        stage = part(progress, 0.0 if spread is None else _SPREAD, 1.0)
         classes, counted = learned_classes(
-            examples, motion, pole_pairs=pole_pairs, seed=seed, progress=own
+            examples, motion, pole_pairs=pole_pairs, seed=seed, progress=stage
         )
         report |= counted
     return LearnedModel(spread, classes, report)

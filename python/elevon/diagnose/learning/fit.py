@@ -40,7 +40,7 @@ _MANY_TREES = {
 _TEMPERATURES = np.geomspace(1.0, 30.0, 30)  # scores are flattened, never sharpened
 _LEAST = 3  # logs of a class
 _LEAST_SIZED = 10  # logs of a kind with a severity: below that no interval of 90 % is conformal
-_HELD = 0.9  # of errors that an interval of a severity holds
+_COVERED = 0.9  # of errors that an interval of a severity holds
 _NAMED = 0.95  # of single faults that must be named from a severity on
 
 
@@ -268,7 +268,9 @@ def _warmth(left: _LeftOut, examples: Examples, exclusive: bool) -> tuple[float,
     return losses[best], float(_TEMPERATURES[best])
 
 
-def _said(scores: Floats, kinds: tuple[str, ...], exclusive: bool, classes: Strings) -> Bools:
+def _named_kinds(
+    scores: Floats, kinds: tuple[str, ...], exclusive: bool, classes: Strings
+) -> Bools:
     """Return which kinds are said to be there, shape (n, f)."""
     if not exclusive:
         return np.asarray(scores > 0.0)
@@ -278,8 +280,8 @@ def _said(scores: Floats, kinds: tuple[str, ...], exclusive: bool, classes: Stri
 def _judged(left: _LeftOut, examples: Examples, exclusive: bool) -> dict[str, Any]:
     """Counts of what groups left out say, by the most probable class or kinds above one half."""
     there, healthy = examples.present[left.rows], examples.healthy[left.rows]
-    said = _said(left.scores, examples.kinds, exclusive, np.unique(examples.labels))
-    right, alarm = np.all(said == there, axis=1), np.any(said, axis=1)
+    kinds = _named_kinds(left.scores, examples.kinds, exclusive, np.unique(examples.labels))
+    right, alarm = np.all(kinds == there, axis=1), np.any(kinds, axis=1)
     return {
         "logs": len(there), "right": int(right.sum()),
         "interval": share_interval(int(right.sum()), len(there)),
@@ -293,8 +295,8 @@ def _named(
 ) -> Floats:
     """Return the least severity from which on single faults are named, shape (f,)."""
     there, severity = examples.present[rows], np.abs(examples.severity[rows])
-    said = _said(scores, examples.kinds, exclusive, np.array(classes))
-    right, single = np.all(said == there, axis=1), np.sum(there, axis=1) == 1
+    kinds = _named_kinds(scores, examples.kinds, exclusive, np.array(classes))
+    right, single = np.all(kinds == there, axis=1), np.sum(there, axis=1) == 1
     out = np.full(len(examples.kinds), math.nan)
     for k in range(len(out)):
         of = np.flatnonzero(single & there[:, k] & np.isfinite(severity[:, k]))
@@ -362,8 +364,8 @@ def _sizes_left_out(part: Examples, sizes: Floats, seed: int) -> Floats:
 
 
 def _conformal(errors: Floats) -> float:
-    """Return the error whose rank holds `_HELD` of the next ones."""
-    rank = min(math.ceil(_HELD * (len(errors) + 1)), len(errors))
+    """Return the error whose rank holds `_COVERED` of the next ones."""
+    rank = min(math.ceil(_COVERED * (len(errors) + 1)), len(errors))
     return float(np.sort(errors)[rank - 1])
 
 

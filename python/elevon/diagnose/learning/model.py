@@ -357,18 +357,18 @@ def _stored_classes(classes: LearnedClasses) -> tuple[dict[str, Any], Arrays]:
     """Return the JSON part and the arrays of a classifier."""
     arrays: Arrays = {"command": classes.motion.command, "share": classes.share}
     for name, view in classes.views.items():
-        own: Arrays = {
+        members: Arrays = {
             f"discriminant.{n}": np.asarray(getattr(view.discriminant, n)) for n in _OF_DISCRIMINANT
         }
-        own |= {n: getattr(view, n) for n in _OF_VIEW}
-        own["named"] = np.nan_to_num(view.named, nan=-1.0)
+        members |= {n: getattr(view, n) for n in _OF_VIEW}
+        members["named"] = np.nan_to_num(view.named, nan=-1.0)
         if view.trees is not None:
-            own |= {f"trees.{n}": a for n, a in view.trees.arrays().items()}
+            members |= {f"trees.{n}": a for n, a in view.trees.arrays().items()}
         if view.severities is not None:
-            own |= {f"severities.{n}": getattr(view.severities, n) for n in _OF_SEVERITIES}
+            members |= {f"severities.{n}": getattr(view.severities, n) for n in _OF_SEVERITIES}
             stored = view.severities.trees.arrays()
-            own |= {f"severities.trees.{n}": a for n, a in stored.items()}
-        arrays |= {f"{name}.{n}": a for n, a in own.items()}
+            members |= {f"severities.trees.{n}": a for n, a in stored.items()}
+        arrays |= {f"{name}.{n}": a for n, a in members.items()}
     about = {
         "features": list(classes.features), "kinds": list(classes.kinds),
         "severity_units": list(classes.severity_units), "exclusive": classes.exclusive,
@@ -394,18 +394,18 @@ def _read_classes(about: Mapping[str, Any], arrays: Arrays) -> LearnedClasses:
     pole_pairs = None if about["pole_pairs"] is None else float(about["pole_pairs"])
     exclusive = bool(about["exclusive"])
     views = {}
-    for name, said in about["views"].items():
+    for name, entry in about["views"].items():
         head = f"{name}."
-        own = {n.removeprefix(head): a for n, a in arrays.items() if n.startswith(head)}
-        views[name] = _read_view(said, own, len(features), len(kinds))
+        members = {n.removeprefix(head): a for n, a in arrays.items() if n.startswith(head)}
+        views[name] = _read_view(entry, members, len(features), len(kinds))
         _check_columns(views[name], exclusive, len(kinds))
     if ABSOLUTE not in views or not views.keys() <= {ABSOLUTE, RELATIVE}:
         raise ValueError(f"views {sorted(views)}")
     return LearnedClasses(features, kinds, units, exclusive, share, motion, pole_pairs, views)
 
 
-def _read_view(about: Mapping[str, Any], own: Arrays, features: int, kinds: int) -> ClassView:
-    real = {n: np.asarray(a, dtype=np.float64) for n, a in own.items()}
+def _read_view(about: Mapping[str, Any], members: Arrays, features: int, kinds: int) -> ClassView:
+    real = {n: np.asarray(a, dtype=np.float64) for n, a in members.items()}
     stored = {n: real[f"discriminant.{n}"] for n in _OF_DISCRIMINANT}
     classes = tuple(str(name) for name in about["classes"])
     shapes = {
@@ -421,21 +421,23 @@ def _read_view(about: Mapping[str, Any], own: Arrays, features: int, kinds: int)
         float(stored["shrinkage"]), float(stored["temperature"]),
     )  # fmt: skip
     severities = None
-    if "severities.start" in own:
+    if "severities.start" in members:
         parts = [real[f"severities.{n}"] for n in _OF_SEVERITIES]
         if any(part.shape != (kinds,) for part in parts):
             raise ValueError("severities are not those of the kinds")
-        severities = Severities(_read_trees(own, "severities.trees.", features), *parts)
+        severities = Severities(_read_trees(members, "severities.trees.", features), *parts)
     return ClassView(
         discriminant,
-        _read_trees(own, "trees.", features) if "trees.roots" in own else None,
+        _read_trees(members, "trees.", features) if "trees.roots" in members else None,
         float(about["temperature"]), real["healthy"], real["distances"],
         np.where(real["named"] < 0.0, math.nan, real["named"]), severities,
     )  # fmt: skip
 
 
-def _read_trees(own: Arrays, head: str, features: int) -> Trees:
-    trees = Trees.stored({n.removeprefix(head): a for n, a in own.items() if n.startswith(head)})
+def _read_trees(members: Arrays, head: str, features: int) -> Trees:
+    trees = Trees.stored(
+        {n.removeprefix(head): a for n, a in members.items() if n.startswith(head)}
+    )
     if trees.feature.max() >= features:
         raise ValueError("a tree asks for a number that is none")
     return trees
