@@ -57,7 +57,7 @@ def learn(
         What is known of each log, or a table (CSV) with columns ``log``, ``label``, and ``unit``,
         ``condition``, ``severity``, ``healthy``, ``day`` where known. A label is ``healthy``,
         ``KIND@PLACE`` or a word. Without it all logs are healthy days of one unit. A data set has
-        its stage labels.
+        its own labels.
     actuator : Actuator, str or path, optional
         As `elevon.diagnose` will be given it: the spread of the healthy logs is learnt, too.
     pole_pairs : float, optional
@@ -85,7 +85,7 @@ def learn(
         pole_pairs = unit.parameters.value("motor.pole_pairs")
     if (data := as_dataset(logs)) is not None:
         if labels is not None:
-            raise InputError("--labels: a data set has its stage labels")
+            raise InputError("--labels: a data set has its own labels")
         return _learn_dataset(data, unit, pole_pairs, seed, progress)
     items = _listed(logs)
     if labels is None or not isinstance(labels, (str, os.PathLike)):

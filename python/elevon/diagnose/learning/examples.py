@@ -164,10 +164,10 @@ def examples_of_dataset(
     if not items:
         reasons = "; ".join(f"{count} {text}" for text, count in lost.items())
         raise InputError(f"{ds.folder}: no run can be read as a log: {reasons or 'none is done'}")
-    rows_read = table.loc[rows]
-    severity = rows_read[list(kinds)].to_numpy(dtype=np.float64)
+    chosen = table.loc[rows]
+    severity = chosen[list(kinds)].to_numpy(dtype=np.float64)
     by = "unit" if table["unit"].nunique() > 1 else "draw"
-    numbers = rows_read[by].to_numpy(dtype=np.int64).tolist()
+    numbers = chosen[by].to_numpy(dtype=np.int64).tolist()
     unit = np.array([f"{by} {number}" for number in numbers])
     names, values = _varied(items)
     examples = Examples(
@@ -206,7 +206,7 @@ def run_logs(
     Raises
     ------
     InputError
-        The campaign rows_read no signals, or none of a log.
+        The campaign recorded no signals, or none of a log.
     Interrupted
         `progress` returned False.
     """
