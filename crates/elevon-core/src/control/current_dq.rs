@@ -72,6 +72,29 @@ pub fn largest_gain(delay: f64) -> f64 {
     alternating.min(turning)
 }
 
+/// A voltage vector (d, q) that a circle limits: the direct component first, the quadrature one with what is left. The current
+/// that makes no torque stays controlled, and all the voltage there is turns the rotor.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounded<S> {
+    wanted: [S; 2],
+    pub voltage: [S; 2],
+}
+
+impl<S: Scalar> Bounded<S> {
+    #[inline(always)]
+    pub fn within(limit: S, wanted: [S; 2]) -> Self {
+        let direct = wanted[0].clamp_abs(limit);
+        let room = (limit * limit - direct * direct).maximum(S::zero()).sqrt();
+        Self { wanted, voltage: [direct, wanted[1].clamp_abs(room)] }
+    }
+
+    /// Does the integrator of component `k` stand still? While its voltage is limited and the error drives it further out.
+    #[inline(always)]
+    pub fn holds(&self, k: usize, error: S) -> S::Mask {
+        S::zero().lt((self.wanted[k] - self.voltage[k]) * error)
+    }
+}
+
 impl<S: Scalar> CurrentControl<S> {
     pub fn derive(raw: &[S], pole_pairs: S) -> Self {
         use PwmParameter as P;
@@ -87,8 +110,7 @@ impl<S: Scalar> CurrentControl<S> {
         }
     }
 
-    /// One tick; the voltage vector is limited to what a min-max modulated bridge can give, V / sqrt 3,
-    /// and the integrators stand still while it is.
+    /// One tick; the voltage vector is limited to what a min-max modulated bridge can give, V / sqrt 3.
     #[inline(always)]
     pub fn step(&self, s: &mut CurrentControlState<S>, x: &CurrentSample<S>) {
         let (error_d, error_q) = (x.reference_d - x.current_d, x.reference_q - x.current_q);
@@ -96,13 +118,10 @@ impl<S: Scalar> CurrentControl<S> {
         let v_d = self.proportional * error_d + s.integral_d - electrical * self.inductance * x.current_q;
         let v_q = self.proportional * error_q + s.integral_q + electrical * self.inductance * x.current_d + self.emf_constant * x.speed;
         let limit = x.supply * S::splat(0.577_350_269_189_625_8);
-        let magnitude = (v_d * v_d + v_q * v_q).sqrt();
-        let limited = limit.lt(magnitude);
-        let scale = S::select(limited, limit / magnitude, S::one());
-        s.voltage_d = v_d * scale;
-        s.voltage_q = v_q * scale;
-        s.integral_d = S::select(limited, s.integral_d, s.integral_d + self.integral_step * error_d);
-        s.integral_q = S::select(limited, s.integral_q, s.integral_q + self.integral_step * error_q);
+        let bounded = Bounded::within(limit, [v_d, v_q]);
+        [s.voltage_d, s.voltage_q] = bounded.voltage;
+        s.integral_d = S::select(bounded.holds(0, error_d), s.integral_d, s.integral_d + self.integral_step * error_d);
+        s.integral_q = S::select(bounded.holds(1, error_q), s.integral_q, s.integral_q + self.integral_step * error_q);
         self.modulate(s, x);
     }
 
@@ -161,6 +180,16 @@ mod tests {
             errors.push(1.0 - current);
         }
         errors
+    }
+
+    #[test]
+    fn at_its_limit_the_direct_voltage_comes_first_and_each_integrator_stops_by_itself() {
+        let within = Bounded::within(5.0, [3.0, 1.0]);
+        assert_eq!((within.voltage, within.holds(0, 0.1), within.holds(1, -0.1)), ([3.0, 1.0], false, false));
+        let beyond = Bounded::within(5.0, [-3.0, 9.0]);
+        assert_eq!(beyond.voltage, [-3.0, 4.0]);
+        assert_eq!([beyond.holds(0, -0.1), beyond.holds(1, 0.1), beyond.holds(1, -0.1)], [false, true, false]);
+        assert_eq!(Bounded::within(5.0, [-8.0, 9.0]).voltage, [-5.0, 0.0]);
     }
 
     #[test]

@@ -337,6 +337,32 @@ impl<S: Scalar> Star<S> {
     pub fn saturate(&self, torque: S) -> S {
         torque.clamp_abs(self.torque_limit)
     }
+
+    /// Share of the flux that is left where it would make more than the largest torque: torque and EMF fall alike, and so the
+    /// power that leaves the windings is the shaft's.
+    #[inline(always)]
+    pub fn unsaturated(&self, torque: S) -> S {
+        let size = torque.abs();
+        let beyond = self.torque_limit.lt(size);
+        S::select(beyond, self.torque_limit / S::select(beyond, size, S::one()), S::one())
+    }
+
+    /// Is there such a share, in any lane?
+    #[inline(always)]
+    pub fn saturates(&self, torque: S) -> bool {
+        S::any(self.torque_limit.lt(torque.abs()))
+    }
+
+    /// k_j as these currents leave them.
+    #[inline(always)]
+    pub fn under_load(&self, k: [S; 3], current: [S; 3]) -> [S; 3] {
+        let torque = self.torque(k, current);
+        if !self.saturates(torque) {
+            return k;
+        }
+        let share = self.unsaturated(torque);
+        three!(|j| share * k[j])
+    }
 }
 
 impl<S: Scalar> StarState<S> {

@@ -6,7 +6,7 @@ use crate::control::pi_rate::PiRateParameter;
 use crate::control::sequence::SequenceParameter as Sequence;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::inverter::six_step::SixStepParameter;
-use crate::inverter::supply::SupplyParameter;
+use crate::inverter::supply::{Regeneration, SupplyParameter};
 use crate::motor::star::{MotorParameter as Motor, ShortModel};
 use crate::sensor::proximity::ProximityParameter as Proximity;
 use crate::transmission::lever::{opens_at, LeverParameter};
@@ -77,6 +77,7 @@ fn common(out: &mut Vec<Finding>, raw: &[f64]) {
     lever(out, raw);
     tables(out, raw);
     ways(out, raw);
+    dump(out, raw);
     let (v, low, high) = (raw[Inverter::SupplyVoltage.at()], raw[Sequence::Undervoltage.at()], raw[Sequence::Overvoltage.at()]);
     if !(low..=high).contains(&v) {
         let limit = if v < low { low } else { high };
@@ -89,6 +90,27 @@ fn common(out: &mut Vec<Finding>, raw: &[f64]) {
             0.0,
             "motor.short_model: this actuator has the reduced model of shorted turns only".into(),
         ));
+    }
+}
+
+/// The dump resistor against the trips of the supply in motion and against the supply itself.
+fn dump(out: &mut Vec<Finding>, raw: &[f64]) {
+    if Regeneration::read(raw[SupplyParameter::Regeneration.at()]) == Regeneration::Accept {
+        return;
+    }
+    let path = "supply.dump_voltage";
+    let (begin, trip) = (raw[SupplyParameter::DumpVoltage.at()], raw[Sequence::Overvoltage.at()]);
+    let supply = raw[Inverter::SupplyVoltage.at()] * raw[Inverter::SupplyScale.at()];
+    if begin >= trip {
+        let message = format!(
+            "{path}: a braking motor ends its move with fault 11 (supply in motion): the dump resistor conducts above {begin} V, \
+             control.overvoltage is {trip} V"
+        );
+        out.push(Finding::warning(path, begin, trip, message));
+    }
+    if begin <= supply {
+        let message = format!("{path}: the dump resistor conducts all the time: {begin} V is not above the supply's {supply} V");
+        out.push(Finding::warning(path, begin, supply, message));
     }
 }
 

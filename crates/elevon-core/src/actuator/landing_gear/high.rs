@@ -109,6 +109,7 @@ fn electric<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>, so
     let zero = S::zero();
     let dt = m.c.dt;
     let (k, _) = m.c.coupling(structure, s.body.motion.motor_position);
+    let k = m.c.star.under_load(k, s.current);
     let resistance = m.c.resistance();
     let carrier = m.c.modulator.carrier(t);
     let duty = m.c.duty(&s.body);
@@ -167,7 +168,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
     m.c.hall.observe(&mut s.body.hall, angle, advance, t + m.c.dt, m.c.dt);
     if (k + 1).is_multiple_of(m.mechanical) {
-        let torque = m.c.star.saturate(s.torque * m.per_torque_steps);
+        let torque = s.torque * m.per_torque_steps;
         let acting = m.c.acting(&s.body, inputs, torque, t);
         m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
         s.torque = S::zero();

@@ -103,6 +103,7 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     thermal(out, raw);
     drivetrain(out, raw);
     out.extend(resolver(raw));
+    link(out, raw);
     let (fsj, fdj) = (raw[FrictionParameter::Static.at()], raw[FrictionParameter::Dynamic.at()]);
     if fdj > fsj {
         out.push(finding("friction.dynamic", fdj, fsj, format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m")));
@@ -111,6 +112,49 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     let (lower, upper) = (raw[StopParameter::Lower.at()], raw[StopParameter::Upper.at()]);
     if lower >= upper {
         out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}")));
+    }
+}
+
+/// Link, chopper and trips against each other: what trips at once cannot run, what comes too late or never is warned of.
+fn link(out: &mut Vec<Finding>, raw: &[f64]) {
+    use crate::inverter::link::{LinkParameter as L, SourceRegeneration};
+    let at = |p: L| raw[p.at()];
+    let capacitance = at(L::LinkCapacitance);
+    if capacitance == 0.0 {
+        return;
+    }
+    let supply = raw[Inverter::SupplyVoltage.at()] * raw[Inverter::SupplyScale.at()];
+    let (least, most) = (at(L::UnderVoltageTrip), at(L::OverVoltageTrip));
+    let (chops, begin) = (at(L::ChopperResistance) > 0.0, at(L::ChopperVoltage));
+    let blocks = SourceRegeneration::read(at(L::SourceRegeneration)) == SourceRegeneration::Block || at(L::ConnectorOpen) >= 0.5;
+    if least >= supply {
+        let path = "inverter.under_voltage_trip";
+        out.push(finding(path, least, supply, format!("{path}: the drive trips at once: {least} V is not below the supply's {supply} V")));
+    }
+    if most > 0.0 && most <= supply {
+        let path = "inverter.over_voltage_trip";
+        out.push(finding(path, most, supply, format!("{path}: the drive trips at once: {most} V is not above the supply's {supply} V")));
+    }
+    if chops && begin - at(L::ChopperBand) <= supply {
+        let (path, end) = ("inverter.chopper_voltage", begin - at(L::ChopperBand));
+        let message =
+            format!("{path}: once on the chopper stays on: it goes off at {end} V (less inverter.chopper_band), the supply has {supply} V");
+        out.push(Finding::warning(path, begin, supply, message));
+    }
+    if chops && most > 0.0 && begin >= most {
+        let path = "inverter.chopper_voltage";
+        let message = format!("{path}: the drive trips at inverter.over_voltage_trip = {most} V before the chopper is on at {begin} V");
+        out.push(Finding::warning(path, begin, most, message));
+    }
+    if blocks && !chops && most == 0.0 {
+        let speed = raw[Control::SpeedLimit.at()].min(supply / (3.0_f64.sqrt() * raw[Motor::EmfConstant.at()]));
+        let inertia = raw[Motor::Inertia.at()] + raw[GearParameter::Inertia.at()];
+        let reached = (supply * supply + inertia * speed * speed / capacitance).sqrt();
+        let message = format!(
+            "inverter.link_capacitance: nothing takes what the braking motor gives: its rotor alone brings the link from {supply} V to \
+             {reached:.0} V at {speed:.0} rad/s; state inverter.chopper_resistance or inverter.over_voltage_trip"
+        );
+        out.push(Finding::warning("inverter.link_capacitance", capacitance, reached, message));
     }
 }
 

@@ -20,6 +20,7 @@ use crate::motor::thermal::Network;
 use crate::sensor::current::{CurrentSensor, CurrentSensorParameter};
 use crate::sensor::resolver::Resolver;
 use crate::time::Steps;
+use crate::variable::Signal;
 
 details! {
     /// Everything that decides which code runs.
@@ -27,7 +28,7 @@ details! {
     always {
         drive: DriveKind = DriveKind::read(x.parts.drive().value(DriveParameter::Kind));
         control: ControlStructure = ControlStructure::read(&x.parts.control());
-        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::high::<F>(x.parts, x.records(F::HIGH, "energy")));
+        shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::high::<F>(x.parts, records(x.parts, F::HIGH, "energy")));
         sensing: SensingDetails = SensingDetails::read::<F>(x.parts);
         motor: MotorStructure = MotorStructure::read(&x.parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&x.parts.pole()));
         /// Which kinds of contacts in or at the windings.
@@ -76,11 +77,6 @@ impl<'a> Needs<'a> {
         Self { parts: Parts(setup) }
     }
 
-    /// Is a signal recorded whose name begins so?
-    fn records(&self, signals: &[crate::variable::Signal], begin: &str) -> bool {
-        self.parts.0.recorded.iter().any(|&s| signals[s].name.starts_with(begin))
-    }
-
     fn link(&self) -> bool {
         DcLink::<f64>::needed(&self.parts.link())
     }
@@ -94,6 +90,11 @@ impl<'a> Needs<'a> {
         let stop = FeedbackLoss::read(self.parts.drive().value(DriveParameter::FeedbackLoss)) == FeedbackLoss::Stop;
         stop && Resolver::<f64>::lost(&self.parts.resolver())
     }
+}
+
+/// Is a signal recorded whose name begins so?
+pub(super) fn records(parts: Parts<'_>, signals: &[Signal], begin: &str) -> bool {
+    parts.0.recorded.iter().any(|&s| signals[s].name.starts_with(begin))
 }
 
 /// Whole solver steps of a carrier drive's computation delay.

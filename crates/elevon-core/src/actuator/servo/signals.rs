@@ -48,10 +48,10 @@ signals! {
         WindingTemperature => "winding_temperature", "T_w", "K", "winding temperature", Temperature;
         WindingTemperatureHottest => "winding_temperature_hottest", "-", "K", "temperature of the hottest phase (thermal network): at standstill up to twice the winding's rise over the surface";
         SurfaceTemperature => "surface_temperature", "T_s", "K", "temperature of the motor's surface", SurfaceTemperature;
-        HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick";
-        HeatLoop => "heat_loop", "-", "W", "copper heat of shorted turns, mean of the network's last tick";
+        HeatCopper => "heat_copper", "P", "W", "copper heat of the phases, mean of the network's last tick; without a network of the present currents";
+        HeatLoop => "heat_loop", "-", "W", "copper heat of shorted turns, mean of the network's last tick; without a network of the present currents";
         HeatContact => "heat_contact", "-", "W", "heat of contacts in the windings, mean of the network's last tick";
-        HeatPhaseHottest => "heat_phase_hottest", "-", "W", "heat of the phase that has most, mean of the network's last tick";
+        HeatPhaseHottest => "heat_phase_hottest", "-", "W", "heat of the phase that has most, mean of the network's last tick; without a network of the present currents";
         HeatAir => "heat_air", "-", "W", "heat given to the air, mean of the network's last tick";
         ThermalWarning => "thermal_warning", "-", "1", "1 while the winding is above its warning temperature";
         Limited => "limited", "-", "1", "1 while the speed or the torque reference stands at its limit";
@@ -68,7 +68,7 @@ signals! {
         ResolverSignal => "resolver_signal", "-", "1", "size of the resolver's sine and cosine over the healthy one";
         LegTransitions => "leg_transitions", "-", "1", "leg transitions since the start; with sampled relays (inverter.relay_crossing) at 1 us a quarter more than relays without delay make: the step's own, as is that part of the currents' ripple", Transitions;
         Tripped => "tripped", "-", "1", "1 once the drive has tripped";
-        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link (given by the source, where the link has a capacitor); while motor.torque_limit cuts the torque, what the EMF takes beyond it is in no other account";
+        EnergySupply => "energy_supply", "-", "J", "energy drawn from the DC link (given by the source, where the link has a capacitor)";
         EnergyCopper => "energy_copper", "-", "J", "copper losses, shorted turns included";
         EnergyInverter => "energy_inverter", "-", "J", "losses in switches and diodes, switching losses included";
         EnergyFriction => "energy_friction", "-", "J", "work against friction, without the brake";
@@ -123,9 +123,12 @@ signals_of! {
         ResolverSpeed;
         ResolverSignal;
         Tripped;
-        EnergyCopper: "copper losses, counted with a thermal network";
+        EnergySupply: "energy drawn from the DC link (given by the source, where the link has a capacitor)";
+        EnergyCopper: "copper losses, shorted turns and the relays' ripple included";
         EnergyHeatStored: "heat in winding and housing above that of the start";
         EnergyAir;
+        EnergySource;
+        EnergyLink;
         StopTorque;
         AmbientTemperature;
     }

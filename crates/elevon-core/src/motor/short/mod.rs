@@ -201,6 +201,12 @@ impl<S: Scalar> Shorts<S> {
         })
     }
 
+    /// Share of each phase's turns that is shorted in a loop of its own.
+    #[inline(always)]
+    pub fn looped(&self) -> [S; 3] {
+        three!(|j| self.contact[LOOP][j].ratio)
+    }
+
     /// Energy in the leakage between the parts of the windings, J.
     #[inline(always)]
     pub fn magnetic(&self, structure: &ShortStructure, c: &Contacts<S>) -> S {

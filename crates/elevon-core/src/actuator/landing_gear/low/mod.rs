@@ -57,7 +57,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let t = S::splat(k as f64) * dt;
     let one = S::one();
     let source = m.c.source(inputs, t);
-    let p = pair(m, structure, s);
+    let p = pair(m, structure, s).weakened(&m.c.star, s.current);
     let zero = S::zero();
     let half = S::splat(0.5);
     let duty = m.c.duty(&s.body) * s.body.driving * (one - s.body.short);

@@ -3,6 +3,7 @@
 use super::super::body::Structure;
 use super::{Model, State};
 use crate::inverter::six_step;
+use crate::motor::star::Star;
 use crate::scalar::Scalar;
 
 /// The conducting pair in series.
@@ -21,6 +22,21 @@ pub(super) struct Pair<S> {
     pub(super) handed: S,
     /// 1: the HIGH leg's; -1: the LOW leg's.
     pub(super) upper: S,
+}
+
+impl<S: Scalar> Pair<S> {
+    /// With the flux that the current leaves it.
+    #[inline(always)]
+    pub(super) fn weakened(mut self, star: &Star<S>, current: S) -> Self {
+        let torque = self.constant * current;
+        if star.saturates(torque) {
+            let share = star.unsaturated(torque);
+            for k in [&mut self.constant, &mut self.emf_shared, &mut self.emf_alone, &mut self.handed] {
+                *k = share * *k;
+            }
+        }
+        self
+    }
 }
 
 #[inline(always)]

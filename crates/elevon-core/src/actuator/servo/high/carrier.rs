@@ -226,7 +226,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     }
 
     // Motor and transmission dynamics.
-    move_on::<S, FULL, FULL>(m, structure, x, s, (m.star.saturate(wound.torque), wound.current));
+    move_on::<S, FULL, FULL>(m, structure, x, s, (wound.torque, wound.current));
 }
 
 /// Behind a carrier.

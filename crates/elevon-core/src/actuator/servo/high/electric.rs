@@ -29,12 +29,13 @@ pub(crate) fn coupling_at<S: Scalar, const FULL: bool>(
     [sin, cos]: [S; 2],
 ) -> Coupling<S> {
     let flux = structure.thermal.then_some(s.star.flux_factor);
-    Coupling { k: m.star.coefficients::<FULL>(&structure.motor, Some(&m.extra.pole), position, [sin, cos], flux) }
+    let k = m.star.coefficients::<FULL>(&structure.motor, Some(&m.extra.pole), position, [sin, cos], flux);
+    Coupling { k: m.star.under_load(k, s.star.current) }
 }
 
 #[inline(always)]
 pub(crate) fn motor_torque<S: Scalar>(m: &Model<S>, s: &State<S>, c: &Coupling<S>) -> S {
-    m.star.saturate(m.star.torque(c.k, s.star.current))
+    m.star.torque(c.k, s.star.current)
 }
 
 /// What switches the legs during a step.

@@ -51,9 +51,10 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, t: S, ou
     set(Q::WindingTemperatureHottest, if structure.heat { m.extra.network.hottest(warm) } else { m.temperature });
     set(Q::SurfaceTemperature, m.extra.network.housing(structure.heat, warm));
     set(Q::AmbientTemperature, m.extra.network.air());
-    set(Q::HeatPhaseHottest, warm.hottest);
-    set(Q::HeatCopper, warm.power[0]);
-    set(Q::HeatLoop, warm.power[1]);
+    let [copper, loops, hottest] = if structure.heat { [warm.power[0], warm.power[1], warm.hottest] } else { copper_heat(structure, m, s) };
+    set(Q::HeatPhaseHottest, hottest);
+    set(Q::HeatCopper, copper);
+    set(Q::HeatLoop, loops);
     set(Q::HeatContact, warm.power[2]);
     set(Q::HeatAir, warm.power[3]);
     set(Q::DriveTemperature, s.extra.drive_heat.temperature);
@@ -65,6 +66,18 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, t: S, ou
     set(Q::ResolverPosition, resolver);
     set(Q::ResolverSpeed, speed);
     set(Q::ResolverSignal, signal);
+}
+
+/// Copper heat of the present currents: of the phases, of shorted turns, of the phase that has most.
+#[inline(always)]
+fn copper_heat<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> [S; 3] {
+    let (shorts, turns, contact) = (&m.extra.shorts, s.star.current, &s.star.contact);
+    let (phases, loops) = (shorts.phases(&structure.shorts, turns, contact), shorts.loops(&structure.shorts, turns, contact));
+    let (share, factor) = (shorts.looped(), if structure.thermal { s.star.resistance_factor } else { S::one() });
+    let of = |share: [S; 3], i: [S; 3]| -> [S; 3] { three!(|j| share[j] * m.star.resistance[j] * factor * i[j].square()) };
+    let copper = of(three!(|j| S::one() - share[j]), phases);
+    let looped = of(share, loops);
+    [copper[0] + copper[1] + copper[2], looped[0] + looped[1] + looped[2], copper[0].maximum(copper[1]).maximum(copper[2])]
 }
 
 #[inline(always)]

@@ -7,8 +7,9 @@ use super::model::{DrivenState, Model, Phase, State};
 use super::phase::coefficients;
 use super::relays::{aligned, Relays};
 use super::structure::Structure;
-use super::windings::{parts, per_winding, settled, Part};
+use super::windings::{parts, per_winding, phase_voltages, settled, Part};
 use crate::actuator::servo::layout::DriveKind;
+use crate::control::current_dq::Bounded;
 use crate::motor::equivalent::quadrature;
 use crate::scalar::{three_phase, Scalar};
 use crate::three;
@@ -58,8 +59,9 @@ pub(super) fn driven_step<S: Scalar>(
     while S::any(k.lt(parts)) {
         let running = k.lt(parts);
         let at = |instant: S| ((instant - middle) * dt).fma(speed, s.shaft.motor_position);
-        let along: [S; 3] = coefficients(m, structure, at(k + half));
-        let emf: [S; 3] = three!(|j| along[j] * s.flux_factor * speed);
+        let cold = coefficients(m, structure, at(k + half));
+        let along: [S; 3] = m.star.under_load(three!(|j| cold[j] * s.flux_factor), x.phases);
+        let emf: [S; 3] = three!(|j| along[j] * speed);
         let (sin, cos) = m.star.electrical_angle(angle_reading(m, structure, s, at(k + one))).sin_cos();
         let (sines, cosines) = three_phase(sin, cos);
         let free = three!(|j| x.phases[j] - per_volt[j] * (emf[j] + resistance[j] * x.phases[j]));
@@ -75,12 +77,12 @@ pub(super) fn driven_step<S: Scalar>(
         let mean: [S; 3] = three!(|j| half * (x.phases[j] + after[j]));
         let sum = |total: S, value: S| S::select(running, share.fma(value, total), total);
         for j in 0..3 {
-            x.torque = sum(x.torque, along[j] * s.flux_factor * mean[j]);
+            x.torque = sum(x.torque, along[j] * mean[j]);
             x.copper = sum(x.copper, resistance[j] * mean[j] * mean[j]);
             x.windings[j] = sum(x.windings[j], resistance[j] * mean[j] * mean[j]);
             x.drawn = sum(x.drawn, memory.legs[j] * mean[j]);
         }
-        x.voltage = sum(x.voltage, quadrature(memory.legs, sines));
+        x.voltage = sum(x.voltage, quadrature(phase_voltages(&part, memory.legs, emf), sines));
         x.phases = three!(|j| S::select(running, after[j], x.phases[j]));
         s.driven.legs = three!(|j| S::select(running, memory.legs[j], s.driven.legs[j]));
         s.driven.integral = [0, 1].map(|a| S::select(running, memory.integral[a], s.driven.integral[a]));
@@ -131,7 +133,7 @@ impl<S: Scalar> Carrier<S> {
 
     #[inline(always)]
     fn step(&self, part: &Part<S>, memory: &mut DrivenState<S>, wanted: S, i: [S; 3]) -> [S; 3] {
-        let (zero, one) = (S::zero(), S::one());
+        let one = S::one();
         let reading: [S; 3] = three!(|j| self.gain[j] * i[j]);
         let (q, d) = (quadrature(reading, part.sines), -quadrature(reading, part.cosines));
         let error = [-d, wanted - q];
@@ -141,13 +143,11 @@ impl<S: Scalar> Carrier<S> {
         let emf = self.emf_constant * part.speed;
         let reference =
             [gain.fma(error[0], memory.integral[0]) - electrical * q, gain.fma(error[1], memory.integral[1]) + electrical * d + emf];
-        let size = (reference[0] * reference[0] + reference[1] * reference[1]).sqrt();
-        let largest = self.voltage_ratio * S::splat(2.0) * part.half_supply;
-        let limited = largest.lt(size);
-        let scale = S::select(limited, largest / S::select(limited, size, one), one);
-        let step = S::select(limited, zero, self.bandwidth * self.resistance * part.dt);
-        memory.integral = [0, 1].map(|a| step.fma(error[a], memory.integral[a]));
-        memory.legs = three!(|j| scale * (reference[1] * part.sines[j] - reference[0] * part.cosines[j]));
+        let bounded = Bounded::within(self.voltage_ratio * S::splat(2.0) * part.half_supply, reference);
+        let step = self.bandwidth * self.resistance * part.dt;
+        memory.integral = [0, 1].map(|a| S::select(bounded.holds(a, error[a]), memory.integral[a], step.fma(error[a], memory.integral[a])));
+        let [v_d, v_q] = bounded.voltage;
+        memory.legs = three!(|j| v_q * part.sines[j] - v_d * part.cosines[j]);
         settled(part, memory.legs)
     }
 }

@@ -166,6 +166,19 @@ impl<S: Scalar> Phase<S> {
             seen: one,
         }
     }
+
+    /// With a share of its flux.
+    pub(super) fn weakened(&self, share: S, control: &Control<S>, inertia: S) -> Self {
+        Self {
+            coefficients: three!(|j| share * self.coefficients[j]),
+            imposed: self.imposed,
+            direct: share * self.direct,
+            believed: self.believed,
+            quadrature: self.quadrature,
+            seen: self.seen,
+            ..Self::new(share * self.torque_constant, self.circuit, control, inertia)
+        }
+    }
 }
 
 /// Constants of the loops; those of phases without a short are zero.
@@ -229,6 +242,8 @@ pub struct State<S> {
     pub network: NetworkState<S>,
     /// Command of the last step; NaN before the first.
     pub command: S,
+    /// Since the start, J: drawn from the link, lost in the copper.
+    pub drawn: S,
     pub copper: S,
     /// Amplitude of the imposed currents.
     pub current: S,
@@ -258,7 +273,7 @@ pub struct State<S> {
 }
 
 kept!(State<f64> as State {
-    link, resistance_factor, flux_factor, network, command, copper, current, current_q, current_seen, phases, loops, bridge, driven,
+    link, resistance_factor, flux_factor, network, command, drawn, copper, current, current_q, current_seen, phases, loops, bridge, driven,
     command_noise, jumps, rested, voltage, integral, filtered_error, speed_ref, torque_ref, motor_torque, sensed, filtered, tripped,
     shaft
 });
@@ -383,6 +398,7 @@ impl<S: Scalar> Model<S> {
             flux_factor,
             network: warm,
             command: nan,
+            drawn: zero,
             copper: zero,
             current: zero,
             current_q: zero,

@@ -6,7 +6,8 @@ use crate::actuator::servo::advance::Instant;
 use crate::actuator::servo::layout::COMMAND;
 use crate::actuator::servo::signals::{shared, LowSignal as Q, LOW, LOW_SPECIFIC};
 use crate::actuator::{Observation, Signals};
-use crate::scalar::{Kernel, Scalar};
+use crate::scalar::{three_phase, Kernel, Scalar};
+use crate::three;
 
 /// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
 const OF_SHAFT: Signals =
@@ -40,6 +41,7 @@ impl<S: Scalar> Kernel for Observation<'_, Structure, Model<S>, State<S>, S> {
 /// What stands in the state.
 #[inline(always)]
 fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
+    let [copper, hottest] = copper_heat(structure, m, s);
     let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
     for (q, value) in [
         (Q::OutputPosition, s.shaft.output_position),
@@ -57,18 +59,35 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
         (Q::WindingTemperatureHottest, if structure.heat { m.network.hottest(&s.network) } else { m.temperature }),
         (Q::SurfaceTemperature, m.network.housing(structure.heat, &s.network)),
         (Q::AmbientTemperature, m.network.air()),
-        (Q::HeatPhaseHottest, s.network.hottest),
-        (Q::HeatCopper, s.network.power[0]),
+        (Q::HeatPhaseHottest, if structure.heat { s.network.hottest } else { hottest }),
+        (Q::HeatCopper, if structure.heat { s.network.power[0] } else { copper }),
         (Q::HeatAir, s.network.power[3]),
         (Q::ThermalWarning, m.network.warns(&s.network)),
         (Q::Limited, S::indicator(limited)),
         (Q::Tripped, s.tripped.maximum(s.network.over)),
+        (Q::EnergySupply, if structure.link { s.link.given } else { s.drawn }),
+        (Q::EnergySource, s.link.lost),
+        (Q::EnergyLink, m.drive.link.stored(&s.link)),
         (Q::EnergyCopper, s.copper),
         (Q::EnergyHeatStored, m.network.stored(&s.network)),
         (Q::EnergyAir, s.network.heat_out),
     ] {
         out[q as usize] = value;
     }
+}
+
+/// Copper heat of the present currents, of all phases and of the one that has most.
+#[inline(always)]
+fn copper_heat<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>) -> [S; 2] {
+    let phases = if structure.angle {
+        s.phases
+    } else {
+        let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
+        let shape = three_phase(sin, cos).0;
+        three!(|j| shape[j] * s.current)
+    };
+    let loss: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor * phases[j].square());
+    [loss[0] + loss[1] + loss[2], loss[0].maximum(loss[1]).maximum(loss[2])]
 }
 
 /// What inputs and loads decide.

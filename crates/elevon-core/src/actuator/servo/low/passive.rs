@@ -21,6 +21,8 @@ pub(super) struct Passive<S> {
     /// Copper loss of each phase.
     pub windings: [S; 3],
     pub drawn: S,
+    /// Quadrature component of the phase-to-neutral voltages, in the drive's frame.
+    pub voltage: S,
     /// Quadrature component at the step's end, in the rotor's frame and in the drive's.
     pub quadrature: S,
     pub seen: S,
@@ -52,14 +54,18 @@ pub(super) fn passive_step<S: Scalar>(
     let resistance: [S; 3] = three!(|j| m.resistance[j] * s.resistance_factor);
     let dt = share * m.dt;
     let part = Part { dt, half_supply: half * supply, resistance, per_winding: per_winding(m, resistance, dt) };
-    let mut x = Passive { phases: i, torque: zero, copper: zero, windings: [zero; 3], drawn: zero, quadrature: zero, seen: zero };
+    let mut x =
+        Passive { phases: i, torque: zero, copper: zero, windings: [zero; 3], drawn: zero, voltage: zero, quadrature: zero, seen: zero };
     let mut k = zero;
     // Lanes that have all their parts wait for the others.
     while S::any(k.lt(parts)) {
         let running = k.lt(parts);
         let position = ((k + half) * dt).fma(speed, s.shaft.motor_position);
-        let along: [S; 3] = three!(|j| coefficients(m, structure, position)[j] * s.flux_factor);
-        let (after, rail) = part_step(m, structure, s, &part, along, x.phases);
+        let cold = coefficients(m, structure, position);
+        let along = m.star.under_load(three!(|j| cold[j] * s.flux_factor), x.phases);
+        let (after, rail, voltage) = part_step(m, structure, s, &part, along, x.phases);
+        let (sin, cos) = m.star.electrical_angle(((k + half) * dt).fma(p.believed[1], p.believed[0])).sin_cos();
+        x.voltage = S::select(running, share.fma(quadrature(voltage, three_phase(sin, cos).0), x.voltage), x.voltage);
         let middle: [S; 3] = three!(|j| half * (x.phases[j] + after[j]));
         for j in 0..3 {
             let sum = |total: S, value: S| S::select(running, share.fma(value, total), total);
@@ -80,7 +86,7 @@ pub(super) fn passive_step<S: Scalar>(
     x
 }
 
-/// Phase currents after a part of a step, and the rails that they come from.
+/// Phase currents after a part of a step, the rails that they come from, and the phase-to-neutral voltages.
 #[inline(always)]
 fn part_step<S: Scalar>(
     m: &Model<S>,
@@ -89,7 +95,7 @@ fn part_step<S: Scalar>(
     part: &Part<S>,
     along: [S; 3],
     i: [S; 3],
-) -> ([S; 3], [S; 3]) {
+) -> ([S; 3], [S; 3], [S; 3]) {
     let (g, open) = (part.per_winding, [S::zero(); 3]);
     let emf: [S; 3] = three!(|j| along[j] * s.shaft.motor_speed);
     let w = Windings { current: i, emf, per_inductance: g, resistance: part.resistance, open: m.star.open };
@@ -101,5 +107,6 @@ fn part_step<S: Scalar>(
         None => (g[0] * drop[0] + g[1] * drop[1] + g[2] * drop[2]) / (g[0] + g[1] + g[2]),
     };
     let next = three!(|j| i[j] + g[j] * (drop[j] - neutral));
-    (extinguish(&legs, i, next), legs.rail)
+    let voltage = three!(|j| S::select(legs.connected[j], legs.voltage[j] - neutral, emf[j]));
+    (extinguish(&legs, i, next), legs.rail, voltage)
 }

@@ -94,7 +94,8 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
         (loss, power) = (mix(loss, x.copper), mix(power, x.drawn));
         windings = three!(|j| mix(windings[j], x.windings[j]));
     }
-    if EXTRA && structure.heat && structure.drive == DriveKind::Hysteresis {
+    let counts = EXTRA && (structure.heat || structure.accounts);
+    if counts && structure.drive == DriveKind::Hysteresis {
         // Relays that switch leave a ripple, which heats and makes no mean torque.
         let idle = if structure.driven { resting(&s.driven.legs) } else { target.equals(coasting) | limited };
         let ripple = ripple_square(m.drive.half_band, m.drive.filter_time, supply / m.cold[2]) * p.circuit.resistance;
@@ -117,11 +118,12 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
         s.network.collected[2] = m.dt.fma(added.contact, s.network.collected[2]);
         s.copper = m.dt.fma(copper, s.copper);
     }
-    if EXTRA && structure.heat {
+    if counts {
         let heat = loss * m.dt;
         s.network.collected[0] = s.network.collected[0] + heat;
         s.network.windings = three!(|j| m.dt.fma(windings[j], s.network.windings[j]));
         s.copper = s.copper + heat;
+        s.drawn = m.dt.fma(power, s.drawn);
     }
 }
 
@@ -176,6 +178,7 @@ fn without_gates<S: Scalar>(
     s.current_q = S::select(passive, x.quadrature, s.current_q);
     s.current_seen = S::select(passive, x.seen, s.current_seen);
     s.motor_torque = S::select(passive, x.torque, s.motor_torque);
+    s.voltage = S::select(passive, x.voltage, s.voltage);
     let windings = three!(|j| S::select(passive, x.windings[j], windings[j]));
     (S::select(passive, x.copper, loss), S::select(passive, x.drawn, power), windings)
 }
@@ -197,6 +200,14 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         &here
     } else {
         &m.healthy
+    };
+    let weakened;
+    let torque = p.torque_constant * s.current;
+    let p = if m.star.saturates(torque) {
+        weakened = p.weakened(m.star.unsaturated(torque), &m.control, m.shaft.inertia);
+        &weakened
+    } else {
+        p
     };
     let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
     let (mut shaft_inertia, mut per_shaft) = (m.shaft.inertia, m.per_inertia);

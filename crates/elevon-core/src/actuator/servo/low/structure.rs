@@ -1,5 +1,6 @@
 //! What of a reduced-order servo model a run needs.
 
+use crate::actuator::servo::details::records;
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::SensingDetails;
@@ -76,6 +77,8 @@ details! {
         /// The references stand apart from the rotor by an angle that does not change.
         turned = misled && parts.resolver().away(ResolverParameter::Offset);
         heat = Network::<f64>::needed(&parts.thermal());
+        /// Electrical energies are recorded.
+        accounts = records(parts, F::LOW, "energy");
         link = DcLink::<f64>::needed(&parts.link());
         extra_shaft = shaft.extra;
         extra_sensing = sensing.extra;

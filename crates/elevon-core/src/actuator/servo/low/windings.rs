@@ -37,18 +37,49 @@ pub(super) struct Part<S> {
     pub(super) speed: S,
 }
 
-/// Currents after a part under leg voltages; the neutral keeps their sum at zero.
+/// The star over a part under leg voltages.
+struct Settled<S: Scalar> {
+    /// Currents but for the neutral.
+    raised: [S; 3],
+    /// 1 for a phase that is not interrupted.
+    closed: [S; 3],
+    /// One closed phase alone carries nothing.
+    alone: S::Mask,
+    /// Voltage that keeps the sum of the currents at zero.
+    neutral: S,
+}
+
+impl<S: Scalar> Settled<S> {
+    #[inline(always)]
+    fn of(part: &Part<S>, legs: [S; 3]) -> Self {
+        let (zero, one) = (S::zero(), S::one());
+        let g = part.per_volt;
+        let total = g[0] + g[1] + g[2];
+        let raised: [S; 3] = three!(|j| g[j].fma(legs[j], part.free[j]));
+        let closed: [S; 3] = three!(|j| S::select(g[j].equals(zero), zero, one));
+        let neutral = (closed[0] * raised[0] + closed[1] * raised[1] + closed[2] * raised[2]) / S::select(total.equals(zero), one, total);
+        let alone = (closed[0] + closed[1] + closed[2]).lt(S::splat(1.5));
+        Self { raised, closed, alone, neutral }
+    }
+}
+
+/// Currents after a part under leg voltages.
 #[inline(always)]
 pub(super) fn settled<S: Scalar>(part: &Part<S>, legs: [S; 3]) -> [S; 3] {
-    let (zero, one) = (S::zero(), S::one());
+    let x = Settled::of(part, legs);
     let g = part.per_volt;
-    let total = g[0] + g[1] + g[2];
-    let raised: [S; 3] = three!(|j| g[j].fma(legs[j], part.free[j]));
-    let closed: [S; 3] = three!(|j| S::select(g[j].equals(zero), zero, one));
-    let neutral = (closed[0] * raised[0] + closed[1] * raised[1] + closed[2] * raised[2]) / S::select(total.equals(zero), one, total);
-    // One closed phase alone carries nothing.
-    let alone = (closed[0] + closed[1] + closed[2]).lt(S::splat(1.5));
-    three!(|j| S::select(alone, zero, closed[j] * (raised[j] - g[j] * neutral)))
+    three!(|j| S::select(x.alone, S::zero(), x.closed[j] * (x.raised[j] - g[j] * x.neutral)))
+}
+
+/// Voltages of the phases over a part, to the neutral where one is interrupted, which has its EMF.
+#[inline(always)]
+pub(super) fn phase_voltages<S: Scalar>(part: &Part<S>, legs: [S; 3], emf: [S; 3]) -> [S; 3] {
+    let x = Settled::of(part, legs);
+    let whole = (x.closed[0] + x.closed[1] + x.closed[2]).equals(S::splat(3.0));
+    three!(|j| {
+        let loose = S::select(x.alone | x.closed[j].equals(S::zero()), emf[j], legs[j] - x.neutral);
+        S::select(whole, legs[j], loose)
+    })
 }
 
 #[cfg(test)]
