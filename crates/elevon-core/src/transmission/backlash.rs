@@ -13,12 +13,11 @@ variables! {
     BacklashParameter, BACKLASH {
         Total => "total", "2 BLK", "rad", NonNegative, Plant, None, "total backlash, twice the half amplitude BLK of the papers";
         Extra => "extra", "-", "rad", NonNegative, Plant, Some(0.0), "healthy 0; backlash added by wear, at the output";
-        Model => "model", "-", "1", Choice(BacklashModel::NAMES), Plant, Some(0.0), "the backlash operator, rigid flanks where a force or friction acts on the output; or two masses with an elastic, damped dead zone",
-            high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model");
+        Model => "model", "-", "1", Choice(BacklashModel::NAMES), Plant, Some(0.0), "the backlash operator, rigid flanks where a force or friction acts on the output; or two masses with an elastic, damped dead zone. The reduced-order model keeps rigid flanks, and what acts on the output winds up the stiffness behind them in proportion";
         Stiffness => "stiffness", "K", "N m/rad", Positive, Plant, Some(1e4), "contact stiffness at the output (elastic model)",
-            high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model").when(&[Chosen("backlash.model", &["elastic"])]);
+            when(&[Chosen("backlash.model", &["elastic"])]);
         Damping => "damping", "C", "N m s/rad", NonNegative, Plant, Some(0.0), "contact damping at the output (elastic model)",
-            high_only("it keeps the backlash operator: two masses on a contact need the steps of the switching model").when(&[Chosen("backlash.model", &["elastic"])]);
+            high_only("it has rigid flanks on a stiffness: two masses on a contact need the steps of the switching model").when(&[Chosen("backlash.model", &["elastic"])]);
     }
 }
 

@@ -20,6 +20,9 @@ variables! {
     StopParameter, STOP {
         Upper => "upper", "-", "rad", Any, Plant, None, "upper end stop";
         Lower => "lower", "-", "rad", Any, Plant, None, "lower end stop";
+        Stiffness => "stiffness", "K_stop", "N m/rad", NonNegative, Plant, Some(0.0), "stiffness of an end stop, at the output; 0: rigid, what reaches it stands at once";
+        Damping => "damping", "C_stop", "N m s/rad", NonNegative, Plant, Some(0.0), "damping of an end stop while it is pressed, at the output; it pushes, never pulls",
+            when(&[Away("stop.stiffness", 0.0)]);
     }
 }
 
@@ -54,18 +57,29 @@ pub struct Gear<S> {
 impl<S: Scalar> Gear<S> {
     /// `ratio` is the motor's angle over the output's coordinate, `screw` the efficiencies of what follows the gear.
     pub fn derive(ratio: S, gear: &[S], stop: &[S], load: &[S], screw: [S; 2]) -> Self {
-        let (upper, lower) = (stop[StopParameter::Upper as usize], stop[StopParameter::Lower as usize]);
+        let at = |p: StopParameter| stop[p as usize];
+        let output_stop = Stop {
+            upper: at(StopParameter::Upper),
+            lower: at(StopParameter::Lower),
+            stiffness: at(StopParameter::Stiffness),
+            damping: at(StopParameter::Damping),
+        };
         Self {
             ratio,
             per_ratio: S::one() / ratio,
             opposing: S::one() / (gear[GearParameter::Efficiency as usize] * screw[0]) - S::one(),
             aiding: S::one() - gear[GearParameter::EfficiencyAiding as usize] * screw[1],
-            motor_stop: Stop { upper: upper * ratio, lower: lower * ratio },
-            output_stop: Stop { upper, lower },
+            motor_stop: output_stop.behind(ratio),
+            output_stop,
             stiffness: load[LoadParameter::Stiffness as usize],
             spring_zero: load[LoadParameter::SpringZero as usize],
             constant: load[LoadParameter::Constant as usize],
         }
+    }
+
+    /// Do the end stops give way?
+    pub fn buffered(view: &View<StopParameter>) -> bool {
+        view.away(StopParameter::Stiffness)
     }
 
     /// Does a load add to the friction?

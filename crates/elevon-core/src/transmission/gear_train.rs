@@ -25,7 +25,7 @@ const STEPS: &str = "it lumps the gear's bodies on the motor's shaft and the bac
 variables! {
     /// Bodies and meshes of the gear.
     GearTrainParameter, GEAR_TRAIN {
-        Model => "model", "-", "1", Choice(GearModel::NAMES), Plant, Some(0.0), "one inertia on the motor's shaft and one backlash at the output; stages in a row, a body behind each and a backlash in each mesh; or the compound planetary gear of Wolfrom with a backlash between sun and planets, planets and fixed ring, planets and output ring. The reduced-order model lumps both: their inertias on the motor's shaft, their lost motion at the output";
+        Model => "model", "-", "1", Choice(GearModel::NAMES), Plant, Some(0.0), "one inertia on the motor's shaft and one backlash at the output; stages in a row, a body behind each and a backlash in each mesh; or the compound planetary gear of Wolfrom with a backlash between sun and planets, planets and fixed ring, planets and output ring. The reduced-order model lumps them: their inertias on the motor's shaft, their lost motion and their compliance at the output";
         Stages => "stages", "-", "1", Count(1.0, MESHES as f64), Plant, Some(2.0), "stages in a row, a mesh each; the ratio of the last follows from gear.ratio",
             when(&[Chosen("gear.model", &["stages"])]);
         Ratio1 => "ratio_1", "i_1", "1", Positive, Plant, Some(4.0), "ratio of the first of several stages",
@@ -53,11 +53,11 @@ variables! {
         MeshBacklash3 => "mesh_backlash_3", "b_3", "rad", NonNegative, Plant, Some(3.1904e-3), "total backlash of the third mesh, at the output",
             when(&[Chosen("gear.model", &["stages", "wolfrom"]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 1.0)]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 2.0)])]);
         MeshStiffness1 => "mesh_stiffness_1", "K_1", "N m/rad", Positive, Plant, Some(234.0), "stiffness of the first mesh, at the wheel of its backlash",
-            high_only(STEPS).when(&[Chosen("gear.model", &["stages", "wolfrom"])]);
+            when(&[Chosen("gear.model", &["stages", "wolfrom"])]);
         MeshStiffness2 => "mesh_stiffness_2", "K_2", "N m/rad", Positive, Plant, Some(2108.0), "stiffness of the second mesh, at the wheel of its backlash",
-            high_only(STEPS).when(&[Chosen("gear.model", &["stages", "wolfrom"]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 1.0)])]);
+            when(&[Chosen("gear.model", &["stages", "wolfrom"]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 1.0)])]);
         MeshStiffness3 => "mesh_stiffness_3", "K_3", "N m/rad", Positive, Plant, Some(2041.0), "stiffness of the third mesh, at the output",
-            high_only(STEPS).when(&[Chosen("gear.model", &["stages", "wolfrom"]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 1.0)]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 2.0)])]);
+            when(&[Chosen("gear.model", &["stages", "wolfrom"]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 1.0)]), Either(&[Chosen("gear.model", &["wolfrom"]), Away("gear.stages", 2.0)])]);
         MeshDamping1 => "mesh_damping_1", "C_1", "N m s/rad", NonNegative, Plant, Some(0.195), "damping of the first mesh while it carries",
             high_only(STEPS).when(&[Chosen("gear.model", &["stages", "wolfrom"])]);
         MeshDamping2 => "mesh_damping_2", "C_2", "N m s/rad", NonNegative, Plant, Some(1.755), "damping of the second mesh while it carries",
@@ -166,8 +166,9 @@ pub struct GearTrain<S> {
     pub turns: [S; BODIES],
     pub inertia: [S; BODIES],
     per_inertia: [S; BODIES],
-    /// Lost motion of all meshes at the output.
+    /// Lost motion of all meshes at the output, and the angle that they give way there per torque.
     pub lost_motion: S,
+    pub compliance: S,
     /// Inertia of the bodies on the motor's shaft, without backlash.
     pub reflected: S,
 }
@@ -183,6 +184,7 @@ impl<S: Scalar> GearTrain<S> {
             inertia: [zero; BODIES],
             per_inertia: [zero; BODIES],
             lost_motion: zero,
+            compliance: zero,
             reflected: zero,
         }
     }
@@ -204,6 +206,8 @@ impl<S: Scalar> GearTrain<S> {
             all.flanks[j] = Backlash::of(half * total, at(P::MeshStiffness1), at(P::MeshDamping1));
             all.worn[j] = if last { one } else { zero };
             all.lost_motion = all.lost_motion + kinematics.output[j] * total;
+            // By virtual work a torque at the output is that share of it in each mesh.
+            all.compliance = all.compliance + kinematics.output[j] * kinematics.output[j] / all.flanks[j].stiffness;
         }
         for k in 0..kinematics.last.min(BODIES) {
             all.inertia[k] = raw[P::Inertia1 as usize + k];

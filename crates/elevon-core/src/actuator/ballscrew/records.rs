@@ -32,7 +32,10 @@ const RAM_BACKLASH: [Variable; BACKLASH.len()] = relabelled(
         change(P::Damping as usize, "", "N s/m", "contact damping between ram and load (elastic model)"),
     ],
 );
-const RAM_STOP: [Variable; STOP.len()] = relabelled(STOP, &[unit(T::Upper as usize, "m"), unit(T::Lower as usize, "m")]);
+const RAM_STOP: [Variable; STOP.len()] = relabelled(
+    STOP,
+    &[unit(T::Upper as usize, "m"), unit(T::Lower as usize, "m"), unit(T::Stiffness as usize, "N/m"), unit(T::Damping as usize, "N s/m")],
+);
 const RAM_LOAD: [Variable; LOAD.len()] = relabelled(
     LOAD,
     &[

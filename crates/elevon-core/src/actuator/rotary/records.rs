@@ -11,7 +11,7 @@ use crate::variable::acts::{high_only, when, When};
 use crate::variable::{extended, relabelled, Relabel, Signal, Variable};
 use layout::At as _;
 
-const OPERATOR: &str = "it keeps the backlash operator: two masses on a contact need the steps of the switching model";
+const OPERATOR: &str = "it has rigid flanks on a stiffness: two masses on a contact need the steps of the switching model";
 const LUMPED: When = When::Chosen("gear.model", &["lumped"]);
 const ELASTIC: &[When] = &[When::Chosen("backlash.model", &["elastic"]), LUMPED];
 
@@ -20,8 +20,8 @@ const LUMPED_BACKLASH: [Variable; BACKLASH.len()] = relabelled(
     BACKLASH,
     &[
         Relabel::acts(P::Total as usize, when(&[LUMPED])),
-        Relabel::acts(P::Model as usize, high_only(OPERATOR).when(&[LUMPED])),
-        Relabel::acts(P::Stiffness as usize, high_only(OPERATOR).when(ELASTIC)),
+        Relabel::acts(P::Model as usize, when(&[LUMPED])),
+        Relabel::acts(P::Stiffness as usize, when(ELASTIC)),
         Relabel::acts(P::Damping as usize, high_only(OPERATOR).when(ELASTIC)),
     ],
 );

@@ -85,7 +85,7 @@ signals! {
         EnergyLink => "energy_link", "-", "J", "energy of the link's capacitor above that of the start";
         DriveTemperature => "drive_temperature", "T_d", "K", "temperature of the drive, warmed by the inverter's losses (thermal network)", DriveTemperature;
         HeatDrive => "heat_drive", "-", "W", "losses of the inverter, mean of the network's last tick";
-        StopTorque => "stop_torque", "-", "N m", "torque on the motor shaft that the end stop's reaction cancels";
+        StopTorque => "stop_torque", "-", "N m", "torque of the end stop at the motor shaft: what its reaction cancels, or of its stiffness and damping (stop.stiffness)";
         AmbientTemperature => "ambient_temperature", "T_a", "K", "temperature of the air: thermal.ambient, or the input `ambient`";
     }
 }

@@ -101,6 +101,22 @@ impl<S: Scalar> Shaft<S> {
         let output = (self.free_output(d, speed, force, friction).speed - speed) / self.dt;
         let parts = ((motor - output) * side).lt(zero);
         s.flank.side = S::select(doubtful & parts, zero, side);
+        if d.compliant {
+            // What lets go is no longer wound up.
+            let slack = s.motor_position * self.gear.per_ratio - side * half;
+            s.output_position = S::select(doubtful & parts, slack, s.output_position);
+        }
+    }
+
+    /// Place of an output on a flank at `slack`, wound up by what acts on it: x = slack - c (T + K_s (x - x_0)).
+    #[inline(always)]
+    fn wound(&self, d: &ShaftDetails, x: &Instant<S>, slack: S) -> S {
+        if !d.compliant {
+            return slack;
+        }
+        let load = if d.weight { x.output + self.gear.constant } else { x.output };
+        let at_zero = load - self.gear.stiffness * self.gear.spring_zero;
+        (slack - self.compliance * at_zero) / self.compliance.fma(self.gear.stiffness, S::one())
     }
 
     /// A step of the output by itself: damping, spring and dry friction are implicit, so that any inertia runs.
@@ -127,7 +143,7 @@ impl<S: Scalar> Shaft<S> {
         let (joined, before) = (self.joined(s), *s);
         let friction = if EXTRA && d.load_side { self.load_side_friction(d, x) } else { S::zero() };
         let (driver, half) = (s.motor_position * per_ratio, self.half_backlash(d, s.motor_position));
-        self.follow_joined(s, driver, half);
+        self.follow_joined(d, x, s, [driver, half]);
         if S::any(joined) {
             self.press(d, s, loads.output_torque, friction, [old, before.motor_speed].map(|speed| speed * per_ratio));
         }
@@ -150,7 +166,7 @@ impl<S: Scalar> Shaft<S> {
 
     /// The output on the flank that carries; before anything has acted on it, as the plain operator leaves it.
     #[inline(always)]
-    fn follow_joined(&self, s: &mut ShaftState<S>, driver: S, half: S) {
+    fn follow_joined(&self, d: &ShaftDetails, x: &Instant<S>, s: &mut ShaftState<S>, [driver, half]: [S; 2]) {
         let (zero, one) = (S::zero(), S::one());
         let idle = s.flank.idle();
         let left = s.output_position.clamp(driver - half, driver + half);
@@ -158,7 +174,7 @@ impl<S: Scalar> Shaft<S> {
         let moves = (half * S::splat(REACHED)).le(lag.abs()) & zero.le(lag * s.motor_speed);
         let side = S::select(moves, lag.signed(one), zero);
         let speed = s.motor_speed * self.gear.per_ratio;
-        s.output_position = S::select(idle, left, driver - s.flank.side * half);
+        s.output_position = S::select(idle, left, self.wound(d, x, driver - s.flank.side * half));
         s.output_speed = S::select(idle & !moves, zero, speed);
         s.flank.side = S::select(idle, side, s.flank.side);
     }

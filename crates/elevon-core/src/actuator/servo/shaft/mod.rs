@@ -54,8 +54,12 @@ details! {
     }
     full {
         elastic = x.elastic;
+        /// The end stops give way.
+        buffered = Gear::<f64>::buffered(&x.parts.stop());
+        /// The gear winds up under what acts on the output, in proportion.
+        compliant = x.low && x.winds() && x.loaded::<F>();
         /// A force or friction on the output decides which flank of the backlash carries.
-        flanks = !x.elastic && x.gapped() && x.loaded::<F>();
+        flanks = !x.elastic && (x.gapped() || compliant) && x.loaded::<F>();
         loaded = F::LINEAR || Gear::<f64>::loaded(&x.parts.gear());
         sloped = Friction::<f64>::sloped(&x.parts.friction());
         jams = Friction::<f64>::jams(&x.parts.friction());
@@ -113,6 +117,11 @@ impl<'a> ShaftNeeds<'a> {
             || Teeth::<f64>::needed(&self.parts.tooth())
     }
 
+    /// Has the gear a stiffness?
+    fn winds(&self) -> bool {
+        self.gear.bodies() || BacklashModel::read(self.parts.backlash().value(BacklashParameter::Model)) == BacklashModel::Elastic
+    }
+
     /// Does a force or friction act on the output, now or later?
     fn loaded<F: Form>(&self) -> bool {
         let driven = self.parts.0.driven;
@@ -135,6 +144,8 @@ pub struct Shaft<S> {
     grease: Grease<S>,
     pub gear: Gear<S>,
     pub backlash: Backlash<S>,
+    /// Angle of the output per torque on it while the motor stands.
+    compliance: S,
     gear_train: GearTrain<S>,
     pub screw: Screw<S>,
     /// Static over dynamic friction of the screw.
@@ -217,6 +228,7 @@ impl<S: Scalar> Shaft<S> {
                 rotor = rotor + gear_train.reflected;
             }
         }
+        let compliance = if d.gear.bodies() { gear_train.compliance } else { S::one() / backlash.stiffness };
         let inertia = if d.elastic { rotor } else { rotor + reflected };
         let mut friction = Friction::derive(view.friction());
         friction.lubricated(screw.viscous);
@@ -226,6 +238,7 @@ impl<S: Scalar> Shaft<S> {
             grease: Grease::derive(view.lubricant()),
             gear,
             backlash,
+            compliance,
             gear_train,
             screw,
             train: Train::derive(raw, unbalance.eccentricity(rotor + reflected)),

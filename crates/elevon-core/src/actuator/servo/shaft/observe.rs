@@ -58,6 +58,15 @@ impl<S: Scalar> Shaft<S> {
     #[inline(always)]
     fn stopped(&self, d: &ShaftDetails, x: &Instant<S>, s: &ShaftState<S>, loads: &Loads<S>, net: S) -> S {
         let zero = S::zero();
+        if d.buffered {
+            let (stop, at) = if d.elastic {
+                (&self.gear.output_stop, [s.output_position, s.output_speed])
+            } else {
+                (&self.gear.motor_stop, [s.motor_position, s.motor_speed])
+            };
+            let force = stop.force(at[0], at[1]);
+            return if d.elastic { force * self.gear.per_ratio } else { force };
+        }
         if d.elastic {
             let active = loads.delivered - loads.output_torque;
             let limit = if d.load_side { self.load_side_friction(d, x) } else { zero };

@@ -30,10 +30,26 @@ impl<S: Scalar> Shaft<S> {
         let speed = s.motor_speed;
         let net = Friction::net_torque(torque, loads.load, loads.resist, speed, loads.static_limit);
         if d.elastic {
-            net
-        } else {
-            self.gear.motor_stop.react(s.motor_position, speed, net)
+            return net;
         }
+        if d.buffered {
+            let stop = self.gear.motor_stop.force(s.motor_position, speed);
+            return Friction::net_torque(torque, loads.load + stop, loads.resist + stop, speed, loads.static_limit);
+        }
+        self.gear.motor_stop.react(s.motor_position, speed, net)
+    }
+
+    /// Position and speed after a step at the motor's end stops.
+    #[inline(always)]
+    fn at_stop<const FULL: bool>(&self, d: &ShaftDetails, s: &ShaftState<S>, new_speed: S, moved: S) -> (S, S) {
+        if FULL && d.elastic {
+            return (moved, new_speed);
+        }
+        if FULL && d.buffered {
+            let inertia = self.moving_inertia(d, s);
+            return self.gear.motor_stop.give_way([s.motor_position, moved], [s.motor_speed, new_speed], inertia, self.dt);
+        }
+        self.gear.motor_stop.hold(moved, new_speed)
     }
 
     /// A step on bristles.
@@ -46,7 +62,7 @@ impl<S: Scalar> Shaft<S> {
             dt_per_inertia,
         };
         let bristle = &self.train.law.bristle;
-        if d.elastic {
+        if d.elastic || d.buffered {
             bristle.advance(&push, s.bristle)
         } else {
             bristle.advance_at_stop(&push, s.bristle, s.motor_speed, &self.gear.motor_stop, s.motor_position)
@@ -71,7 +87,12 @@ impl<S: Scalar> Shaft<S> {
             s.bristle = moved.bristle;
             return (moved.speed, Some(moved.dry));
         }
-        let free = dt_per_inertia.fma(self.net(d, s, loads, torque), s.motor_speed);
+        let mut net = self.net(d, s, loads, torque);
+        if FULL && d.buffered && !d.elastic {
+            // The stop has a step of its own.
+            net = net + self.gear.motor_stop.force(s.motor_position, s.motor_speed);
+        }
+        let free = dt_per_inertia.fma(net, s.motor_speed);
         (Friction::stop_at_reversal(s.motor_speed, free), None)
     }
 
@@ -88,7 +109,7 @@ impl<S: Scalar> Shaft<S> {
         let speed = s.motor_speed;
         let (new_speed, on_bristles) = self.new_speed::<FULL, EXTRA>(d, s, loads, torque);
         let moved = self.dt.fma(self.advancing(d, speed, new_speed), s.motor_position);
-        let (position, end_speed) = if FULL && d.elastic { (moved, new_speed) } else { self.gear.motor_stop.hold(moved, new_speed) };
+        let (position, end_speed) = self.at_stop::<FULL>(d, s, new_speed, moved);
         if FULL && d.accounts {
             let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
             self.account(d, s, loads, [speed, new_speed, end_speed], dry);
@@ -159,14 +180,19 @@ impl<S: Scalar> Shaft<S> {
         let new_speed = if EXTRA && d.load_side {
             let dry = self.load_side_friction(d, x);
             let net = Friction::net_torque(active, S::zero(), (self.load_damping).fma(speed, speed.signed(dry)), speed, dry);
-            let net = self.gear.output_stop.react(s.output_position, speed, net);
+            let net = if d.buffered { net } else { self.gear.output_stop.react(s.output_position, speed, net) };
             Friction::stop_at_reversal(speed, speed + self.dt * (self.per_output_inertia * net))
         } else {
-            let net = self.gear.output_stop.react(s.output_position, speed, active);
+            let net = if d.buffered { active } else { self.gear.output_stop.react(s.output_position, speed, active) };
             speed + self.dt * (self.per_output_inertia * net)
         };
         let moved = s.output_position + self.dt * if d.semi_implicit { new_speed } else { speed };
-        let (position, end_speed) = self.gear.output_stop.hold(moved, new_speed);
+        let stop = &self.gear.output_stop;
+        let (position, end_speed) = if d.buffered {
+            stop.give_way([s.output_position, moved], [speed, new_speed], self.output_inertia, self.dt)
+        } else {
+            stop.hold(moved, new_speed)
+        };
         if d.accounts {
             let middle = S::splat(0.5) * (speed + new_speed);
             s.work.load = s.work.load + self.dt * loads.output_torque * middle;
