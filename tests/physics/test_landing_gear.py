@@ -318,6 +318,7 @@ def test_the_software_brake_gives_its_energy_to_the_supply(supply: float) -> Non
     assert low["supply"] < -100.0
 
 
+@pytest.mark.filterwarnings("ignore:supply.dump_voltage")
 @pytest.mark.parametrize("supply", [20.5, 28.0, 32.2])
 def test_a_blocked_source_lets_the_link_rise_alike(supply: float) -> None:
     """What the software brake gives back charges the link until the unit ends the motion, which
@@ -334,6 +335,7 @@ def test_a_blocked_source_lets_the_link_rise_alike(supply: float) -> None:
                 "load.factor": 3.5,
                 "inverter.supply_voltage": supply,
                 "supply.regeneration": "block",
+                "supply.dump_voltage": 36.0,
             },
         )
         state = rec["state"]

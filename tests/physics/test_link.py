@@ -212,6 +212,7 @@ def held_back(fidelity: str, drive: str, values: dict[str, Any]) -> Any:
     )
 
 
+@pytest.mark.filterwarnings("ignore:inverter.link_capacitance")
 @pytest.mark.parametrize("fidelity", ["high", "low"])
 @pytest.mark.parametrize("drive", DRIVES)
 def test_a_blocked_link_without_limits_rises(fidelity: str, drive: str) -> None:
@@ -250,6 +251,7 @@ def test_a_brake_chopper_holds_the_link(fidelity: str, drive: str) -> None:
     assert 445.0 < reached.max() < 454.0
 
 
+@pytest.mark.filterwarnings("ignore:inverter.chopper_voltage")
 def test_the_chopper_decays_the_link_exponentially_and_its_heat_is_counted() -> None:
     """A link at rest above the chopper's voltage: exp(-t/(R C)) down to where it goes off."""
     values = (

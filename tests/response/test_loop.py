@@ -150,7 +150,37 @@ def test_friction_lowers_the_coherence_and_says_so():
         worn, "position", 0.5, 20.0, "0.05 deg", fidelity="low", realisations=4
     )
     assert "coherence falls to" in measured.hint
-    assert "amplitude" in measured.hint
+    assert "describing function" in measured.hint
+    assert measured.feedback_amplitude > 0.0
+
+
+def test_beside_friction_stands_the_linear_loop():
+    """Its crossover and phase are those of the set without friction and backlash."""
+    worn = ACTUATOR.with_values({"friction.static": "0.4 N m", "friction.dynamic": "0.3 N m"})
+    options = {"low": 0.5, "high": 20.0, "fidelity": "low"}
+    straight = loop_response(ACTUATOR, "position", amplitude="0.2 deg", realisations=2, **options)
+    assert straight.linear is None
+    measured = loop_response(worn, "position", amplitude="0.2 deg", realisations=4, **options)
+    true = straight.margins
+    assert measured.linear.crossover.value == pytest.approx(true.crossover.value, rel=0.01)
+    assert measured.linear.phase.value == pytest.approx(true.phase.value, abs=0.5)
+    assert measured.margins.crossover.value < 0.9 * true.crossover.value
+    assert "linear: crossover [Hz]" in measured.margins_table
+
+
+def test_a_margin_stands_within_its_interval_or_is_not_known():
+    """A lag under noise that grows with the frequency: what chance crossings say is no margin."""
+    s = 2j * np.pi * np.geomspace(0.5, 2000.0, 80)
+    frequency, truth = np.abs(s) / (2.0 * np.pi), 20.0 / (s * (0.001 * s + 1.0))
+    std = 1e-3 + 0.3 * (frequency / 200.0) ** 2
+    generator = np.random.default_rng(1)
+    for number in range(30):
+        noise = generator.normal(size=80) + 1j * generator.normal(size=80)
+        found = margins(frequency, truth * np.exp(std * noise), std, seed=number)
+        for margin in (found.crossover, found.phase, found.gain, found.disk):
+            if margin.value is not None and margin.interval is not None:
+                assert margin.interval[0] <= margin.value <= margin.interval[1]
+        assert found.gain.value is None
 
 
 def test_the_feed_forward_is_not_part_of_the_loop():

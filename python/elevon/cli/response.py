@@ -12,7 +12,7 @@ from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
 
 if TYPE_CHECKING:
-    from elevon.response import FrequencyResponse, LoopResponse
+    from elevon.response import FrequencyResponse, LoopResponse, Margin
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -82,21 +82,27 @@ def _refuse(options: dict[str, str | bool | None]) -> None:
         raise InputError(f"{', '.join(given)}: not with --loop, which measures its own signals")
 
 
+def _margin_value(margin: Margin) -> str:
+    unknown = "not known" if margin.interval else "not reached"
+    return unknown if margin.value is None else f"{margin.value:.4g}"
+
+
 def _print_loop(measured: LoopResponse) -> None:
     """Print the margins with their intervals, and what to think of them."""
-    margins = measured.margins
-    rows = []
-    for name, unit, margin in (
-        ("crossover", "Hz", margins.crossover),
-        ("phase margin", "deg", margins.phase),
-        ("gain margin", "dB", margins.gain),
-        ("disk margin", "1", margins.disk),
+    margins, linear = measured.margins, measured.linear
+    head, rows = ["margin", "value", "low", "high", "unit", "at [Hz]"], []
+    for name, field, unit in (
+        ("crossover", "crossover", "Hz"),
+        ("phase margin", "phase", "deg"),
+        ("gain margin", "gain", "dB"),
+        ("disk margin", "disk", "1"),
     ):
+        margin = getattr(margins, field)
         ends = ["", ""] if margin.interval is None else [f"{x:.4g}" for x in margin.interval]
-        value = "not reached" if margin.value is None else f"{margin.value:.4g}"
         at = "" if margin.frequency is None else f"{margin.frequency:.3g}"
-        rows.append([name, value, *ends, unit, at])
-    print_table(("margin", "value", "low", "high", "unit", "at [Hz]"), rows)
+        beside = [] if linear is None else [_margin_value(getattr(linear, field))]
+        rows.append([name, _margin_value(margin), *ends, unit, at, *beside])
+    print_table((*head, *([] if linear is None else ["linear loop"])), rows)
     if measured.hint:
         answer(measured.hint)
 

@@ -9,7 +9,7 @@ not linear bias neither (instrumental variable: T. Soderstrom, P. Stoica, System
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 LEVEL = 0.90
 _DRAWS = 400  # of the loop within its deviation: the ends of an interval to a twentieth of it
+_KNOWN = 0.3  # relative deviation up to which a line counts: 2.6 dB, 17 degrees
 _FINE = 40  # points between two lines, where the loop is interpolated
 
 
@@ -43,7 +44,8 @@ class Margin(Plain):
     Attributes
     ----------
     value : float or None
-        In the unit of its name; None where the frequencies measured do not reach it.
+        In the unit of its name; None where the frequencies measured do not reach it, or the
+        deviation leaves it unknown.
     interval : tuple of float or None
         Of 90 %, from the deviation of the loop; None without one.
     frequency : float or None
@@ -96,6 +98,8 @@ def margins(frequency: Floats, loop: Complex, std: Floats, seed: int = 0) -> Mar
     seed : int
         Of the draws within the deviation.
     """
+    known = _trusted(std)
+    frequency, loop, std = frequency[:known], loop[:known], std[:known]
     draws = []
     if np.isfinite(std).all():
         generator = np.random.default_rng(seed)
@@ -109,6 +113,12 @@ def margins(frequency: Floats, loop: Complex, std: Floats, seed: int = 0) -> Mar
     return Margins(crossover, phase, gain, disk)
 
 
+def _trusted(std: Floats) -> int:
+    """Return how many lines from the first on are known well enough to read a margin from."""
+    unknown = np.flatnonzero(std > _KNOWN)
+    return max(int(unknown[0]), 2) if unknown.size else len(std)
+
+
 _Point = tuple[float, float] | None
 
 
@@ -118,7 +128,10 @@ def _with_interval(
     loop: Complex,
     draws: list[Complex],
 ) -> Margin:
-    """Return a margin; an interval only where nearly all draws reach it, too."""
+    """Return a margin; an interval only where nearly all draws reach it, too.
+
+    A value outside of its interval was read at a chance crossing: that margin is not known.
+    """
     point = reader(frequency, loop)
     if point is None:
         return Margin(None, None, None)
@@ -126,6 +139,8 @@ def _with_interval(
     if len(values) < LEVEL * _DRAWS:
         return Margin(point[0], None, point[1])
     low, high = np.quantile(values, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0])
+    if not low <= point[0] <= high:
+        return Margin(None, (float(low), float(high)), None)
     return Margin(point[0], (float(low), float(high)), point[1])
 
 
@@ -196,11 +211,19 @@ class LoopResponse(BodeLines):
         ``position``, ``speed`` or ``current``.
     command, feedback : str
         Signals compared; the response is the feedback over the error.
+    feedback_amplitude : float
+        Greatest value of the feedback about its mean, SI: with friction, backlash or limits the
+        response is the describing function at this amplitude.
+    linear : Margins or None
+        Margins of the linear loop: measured alike without dry friction and backlash, limits out of
+        reach. None where the loop has neither.
     """
 
     loop: str
     command: str
     feedback: str
+    feedback_amplitude: float = float("nan")
+    linear: Margins | None = None
 
     KIND: ClassVar = "loop-response"
     COMPUTED: ClassVar = ("status", "gain_db", "phase_deg", "margins", "hint")
@@ -208,21 +231,18 @@ class LoopResponse(BodeLines):
 
     @property
     def margins_table(self) -> dict[str, Margin]:
-        """The margins by name."""
-        every = self.margins
-        return {
-            "crossover [Hz]": every.crossover,
-            "phase margin [deg]": every.phase,
-            "gain margin [dB]": every.gain,
-            "disk margin": every.disk,
-        }
+        """The margins by name; beside them those of the linear loop."""
+        table = _named(self.margins)
+        if self.linear is not None:
+            table |= {f"linear: {name}": margin for name, margin in _named(self.linear).items()}
+        return table
 
     @property
     def headline(self) -> str:
         """The answer in one sentence."""
         parts = [
             f"{name} {'not reached' if margin.value is None else f'{margin.value:.3g}'}"
-            for name, margin in self.margins_table.items()
+            for name, margin in _named(self.margins).items()
         ]
         return f"{self.loop} loop of {self.actuator}: {', '.join(parts)}."
 
@@ -233,26 +253,33 @@ class LoopResponse(BodeLines):
 
     @property
     def hint(self) -> str:
-        """What lowers the coherence and how to raise it; empty where it is high up to crossover."""
+        """What lowers the coherence and what it means; empty where it is high up to crossover."""
         crossover = self.margins.crossover.value
         inside = self.frequency <= 2.0 * (crossover or self.frequency[-1])
         if not inside.any() or float(self.coherence[inside].min()) >= _COHERENT:
             return ""
         at = int(np.argmin(np.where(inside, self.coherence, 2.0)))
-        remedy = {
-            "position": "a larger amplitude",
-            "speed": "a bias that keeps the shaft turning, or a larger amplitude",
-            "current": "another amplitude",
-        }[self.loop]
-        return (
+        beside = ", beside which those of the linear loop stand" if self.linear is not None else ""
+        text = (
             f"coherence falls to {self.coherence[at]:.2f} at {self.frequency[at]:.3g} Hz: "
             "friction, backlash, relays or limits shape what was measured, and the margins are "
-            f"not those of a linear loop; {remedy} may help"
+            f"those of a describing function at this amplitude{beside}"
         )
+        # A shaft that keeps turning never sticks.
+        return f"{text}; a bias keeps the shaft turning" if self.loop == "speed" else text
 
     def plot(self) -> Figure:
         """Return a Bode plot: gain, phase, coherence over frequency."""
         return self.bode(f"{self.loop} loop")
+
+
+def _named(every: Margins) -> dict[str, Margin]:
+    return {
+        "crossover [Hz]": every.crossover,
+        "phase margin [deg]": every.phase,
+        "gain margin [dB]": every.gain,
+        "disk margin": every.disk,
+    }
 
 
 def loop_response(
@@ -293,8 +320,9 @@ def loop_response(
     """
     loaded = _checked(as_actuator(actuator), loop, fidelity)
     unit, given = _excited(loaded, loop, amplitude)
+    mode = "torque" if loop == "current" else loop
     excitation = Excitation(
-        loaded, "torque" if loop == "current" else loop, unit, given, bias, load,
+        loaded, mode, unit, given, bias, load,
         realisations=realisations, fidelity=fidelity, seed=seed,
     )  # fmt: skip
     step = solver_step(loaded, fidelity)
@@ -306,10 +334,46 @@ def loop_response(
     command, feedback, factor = _signals(loaded, loop)
     recordings = excitation.recordings(design, f"{command},{feedback}", progress)
     response, coherence, std = _ratio(design, recordings, (command, feedback, factor))
+    linear = None
+    if (straight := _without_nonlinear(loaded)) is not None:
+        usual = replace(excitation, amplitude=_excited(loaded, loop, None)[1])
+        larger = f"{_ABOVE_RELAYS * usual.size!r} {unit}"
+        alike = replace(excitation, actuator=straight, amplitude=larger, realisations=1)
+        found = alike.recordings(design, f"{command},{feedback}", None)
+        linear = margins(design.frequency, *_ratio(design, found, (command, feedback, factor))[::2])
     return LoopResponse(
         loop=loop, frequency=design.frequency, response=response, coherence=coherence, std=std,
         command=command, feedback=feedback, amplitude=excitation.size, realisations=realisations,
+        feedback_amplitude=_size(recordings, feedback, factor), linear=linear,
     )  # fmt: skip
+
+
+#: Dry friction and lost motion of a servo: what a linear loop has not.
+_NONLINEAR = (
+    "friction.static", "friction.dynamic", "load.friction", "screw.preload",
+    "backlash.total", "backlash.extra", "gear.tooth_wear", "gear.tooth_chip",
+)  # fmt: skip
+#: Limits, and by what they are out of reach.
+_LIMITS = ("control.speed_limit", "control.current_limit", "motor.torque_limit")
+_OUT_OF_REACH = 100.0
+#: The relays' band is a small part of so much more of the command.
+_ABOVE_RELAYS = 5.0
+
+
+def _without_nonlinear(actuator: Actuator) -> Actuator | None:
+    """Return the actuator without dry friction and backlash; None where it has neither."""
+    held = actuator.parameters
+    away = {path: 0.0 for path in _NONLINEAR if path in held and held.value(path) != 0.0}
+    if not away:
+        return None
+    wide = {path: _OUT_OF_REACH * held.value(path) for path in _LIMITS}
+    return actuator.with_values(away | wide, source="linear loop", request=False)
+
+
+def _size(recordings: list[Recording], feedback: str, factor: float) -> float:
+    """Return the greatest value of the feedback about its mean."""
+    values = [factor * np.asarray(item[feedback].values) for item in recordings]
+    return max(float(np.max(np.abs(x - np.mean(x)))) for x in values)
 
 
 def _checked(actuator: Actuator, loop: str, fidelity: str) -> Actuator:

@@ -9,6 +9,7 @@
 
 use super::model::{Loops, Phase, State};
 use crate::scalar::Scalar;
+use crate::three;
 
 /// What the loops add to a step.
 pub(super) struct Added<S> {
@@ -42,6 +43,13 @@ impl<S: Scalar> Loops<S> {
             s.loops[j] = new;
         }
         added
+    }
+
+    /// Torque of the loops in the coming step, the phases at the amplitude they have: what the controller's derivative answers to.
+    #[inline(always)]
+    pub(super) fn torque(&self, s: &State<S>, p: &Phase<S>) -> S {
+        let mut after = *s;
+        self.step(&mut after, p, s.phases, three!(|j| p.imposed[j] * s.current)).torque
     }
 
     /// Quadrature voltage that the phases see across the contacts, with the loops at rest against their own time.

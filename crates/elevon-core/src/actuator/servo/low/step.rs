@@ -232,17 +232,24 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
         per_inertia = S::one() / answer.fma(derivative_inertia, shaft_inertia);
     }
     let mut loads = m.shaft.loads::<FULL, EXTRA>(&structure.shaft, x, &s.shaft, torque);
+    let aided;
+    let felt = if EXTRA && structure.loops {
+        aided = loads.aided(m.circuits.torque(s, p));
+        &aided
+    } else {
+        &loads
+    };
     let supply = supply::<S, EXTRA>(m, structure, x, s, p);
     let relays = structure.drive == DriveKind::Hysteresis && structure.control.derivative;
     let three = EXTRA && structure.driven;
     let mut acceleration = S::zero();
     if three || !relays {
-        acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, &loads, torque, per_inertia);
+        acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, felt, torque, per_inertia);
     }
     if relays && (!three || structure.gradual) {
         let per_inertia = if three { S::one() / p.efficacy.fma(derivative_inertia, shaft_inertia) } else { per_inertia };
         let demand = TorqueDemand { torque: demand.torque, inertia: derivative_inertia, per_inertia, per_shaft };
-        let one = within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, &loads);
+        let one = within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, felt);
         acceleration = if three { m.drive.share(one, acceleration) } else { one };
     }
     let unlimited = demand.torque - derivative_inertia * acceleration;

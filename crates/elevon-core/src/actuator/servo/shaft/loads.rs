@@ -28,6 +28,14 @@ pub(in crate::actuator::servo) struct Loads<S> {
     pub(super) resist: S,
 }
 
+impl<S: Scalar> Loads<S> {
+    /// With a further torque that drives the shaft forwards.
+    #[inline(always)]
+    pub(in crate::actuator::servo) fn aided(&self, torque: S) -> Self {
+        Self { load: self.load - torque, resist: self.resist - torque, ..*self }
+    }
+}
+
 impl<S: Scalar> Shaft<S> {
     /// Everything on the shaft under the motor's `torque`, which decides the direction of what is about to start.
     #[inline(always)]
