@@ -73,8 +73,8 @@ def test_a_loaded_ballscrew_loses_no_motion(model: str, fidelity: str) -> None:
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_an_unloaded_ballscrew_loses_all_of_it(fidelity: str) -> None:
-    """50 N of the fixture's friction hold the load where the ram left it; at low, where the joint has
-    the stiffness of the set, 45 N wind it up on one flank.
+    """50 N of the fixture's friction hold the load where the ram left it; at low the joint
+    has the stiffness of the set, and 45 N wind it up on one flank.
     """
     wear = ["backlash@transmission=0.2 mm"]
     lost = lost_motion("nasa-ballscrew", "operator", fidelity, 45.0, "20 mm", wear)
