@@ -71,10 +71,10 @@ def test_at_the_voltage_limit_no_direct_current_takes_the_voltage(
 def test_an_open_phase_has_its_emf_in_the_quadrature_voltage(drive: dict[str, Any]) -> None:
     """Phase-to-neutral voltages, the open one's too: R i_q + k w + p w L i_d in the mean."""
     values = {"control.speed_gain": 0.05, "motor.open_a": 1.0, "friction.viscous": 0.01}
-    shown = {}
+    recordings = {}
     for fidelity in ("high", "low"):
         direct = ",current_d" if fidelity == "high" else ""
-        shown[fidelity] = run(
+        recordings[fidelity] = run(
             FREE_SHAFT | drive | values,
             duration=1.0,
             mode="speed",
@@ -83,13 +83,13 @@ def test_an_open_phase_has_its_emf_in_the_quadrature_voltage(drive: dict[str, An
             record=f"voltage_q_meas,motor_speed,current_q{direct}@2 kHz",
         )
     speed, i_q, i_d = (
-        shown["high"][n].values[-400:] for n in ("motor_speed", "current_q", "current_d")
+        recordings["high"][n].values[-400:] for n in ("motor_speed", "current_q", "current_d")
     )
     expected = float(np.mean(R * i_q + K * speed + P * speed * L * i_d))
-    voltage = late(shown["high"], "voltage_q_meas")
+    voltage = late(recordings["high"], "voltage_q_meas")
     assert voltage == pytest.approx(expected, rel=0.01)
     # The mean legs of the relays are the reduced-order model's own.
-    assert late(shown["low"], "voltage_q_meas") == pytest.approx(voltage, rel=0.03)
+    assert late(recordings["low"], "voltage_q_meas") == pytest.approx(voltage, rel=0.03)
 
 
 @FIDELITIES
@@ -250,8 +250,8 @@ def wolfrom_lost_motion(torque: float) -> float:
 
 def numbers(group: str) -> dict[str, float]:
     """The numbers of a group of the rotary set with its gear of planets."""
-    held = actuator(FREE_SHAFT | WOLFROM | {"load.inertia": 0.05}).parameters
-    values = {path: held[path].value for path in held if path.startswith(f"{group}.")}
+    parameters = actuator(FREE_SHAFT | WOLFROM | {"load.inertia": 0.05}).parameters
+    values = {path: parameters[path].value for path in parameters if path.startswith(f"{group}.")}
     return {p.split(".")[1]: float(v) for p, v in values.items() if not isinstance(v, str)}
 
 

@@ -100,8 +100,8 @@ def _print_loop(measured: LoopResponse) -> None:
         margin = getattr(margins, field)
         ends = ["", ""] if margin.interval is None else [f"{x:.4g}" for x in margin.interval]
         at = "" if margin.frequency is None else f"{margin.frequency:.3g}"
-        beside = [] if linear is None else [_margin_value(getattr(linear, field))]
-        rows.append([name, _margin_value(margin), *ends, unit, at, *beside])
+        linear_value = [] if linear is None else [_margin_value(getattr(linear, field))]
+        rows.append([name, _margin_value(margin), *ends, unit, at, *linear_value])
     print_table((*head, *([] if linear is None else ["linear loop"])), rows)
     if measured.hint:
         answer(measured.hint)

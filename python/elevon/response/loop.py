@@ -259,11 +259,13 @@ class LoopResponse(BodeLines):
         if not inside.any() or float(self.coherence[inside].min()) >= _COHERENT:
             return ""
         at = int(np.argmin(np.where(inside, self.coherence, 2.0)))
-        beside = ", beside which those of the linear loop stand" if self.linear is not None else ""
+        comparison = (
+            ", beside which those of the linear loop stand" if self.linear is not None else ""
+        )
         text = (
             f"coherence falls to {self.coherence[at]:.2f} at {self.frequency[at]:.3g} Hz: "
             "friction, backlash, relays or limits shape what was measured, and the margins are "
-            f"those of a describing function at this amplitude{beside}"
+            f"those of a describing function at this amplitude{comparison}"
         )
         # A shaft that keeps turning never sticks.
         return f"{text}; a bias keeps the shaft turning" if self.loop == "speed" else text
@@ -362,11 +364,13 @@ _ABOVE_RELAYS = 5.0
 
 def _without_nonlinear(actuator: Actuator) -> Actuator | None:
     """Return the actuator without dry friction and backlash; None where it has neither."""
-    held = actuator.parameters
-    away = {path: 0.0 for path in _NONLINEAR if path in held and held.value(path) != 0.0}
+    parameters = actuator.parameters
+    away = {
+        path: 0.0 for path in _NONLINEAR if path in parameters and parameters.value(path) != 0.0
+    }
     if not away:
         return None
-    wide = {path: _OUT_OF_REACH * held.value(path) for path in _LIMITS}
+    wide = {path: _OUT_OF_REACH * parameters.value(path) for path in _LIMITS}
     return actuator.with_values(away | wide, source="linear loop", request=False)
 
 

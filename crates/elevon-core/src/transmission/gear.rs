@@ -77,7 +77,7 @@ impl<S: Scalar> Gear<S> {
         }
     }
 
-    /// Do the end stops give way?
+    /// Are the end stops elastic?
     pub fn buffered(view: &View<StopParameter>) -> bool {
         view.away(StopParameter::Stiffness)
     }

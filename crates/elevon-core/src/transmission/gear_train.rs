@@ -166,7 +166,7 @@ pub struct GearTrain<S> {
     pub turns: [S; BODIES],
     pub inertia: [S; BODIES],
     per_inertia: [S; BODIES],
-    /// Lost motion of all meshes at the output, and the angle that they give way there per torque.
+    /// Lost motion of all meshes at the output, and their compliance there.
     pub lost_motion: S,
     pub compliance: S,
     /// Inertia of the bodies on the motor's shaft, without backlash.

@@ -54,7 +54,7 @@ details! {
     }
     full {
         elastic = x.elastic;
-        /// The end stops give way.
+        /// The end stops are elastic.
         buffered = Gear::<f64>::buffered(&x.parts.stop());
         /// The gear winds up under what acts on the output, in proportion.
         compliant = x.low && x.winds() && x.loaded::<F>();
