@@ -341,8 +341,10 @@ def loop_response(
         usual = replace(excitation, amplitude=_excited(loaded, loop, None)[1])
         larger = f"{_ABOVE_RELAYS * usual.size!r} {unit}"
         alike = replace(excitation, actuator=straight, amplitude=larger, realisations=1)
-        found = alike.recordings(design, f"{command},{feedback}", None)
-        linear = margins(design.frequency, *_ratio(design, found, (command, feedback, factor))[::2])
+        straight_recordings = alike.recordings(design, f"{command},{feedback}", None)
+        linear = margins(
+            design.frequency, *_ratio(design, straight_recordings, (command, feedback, factor))[::2]
+        )
     return LoopResponse(
         loop=loop, frequency=design.frequency, response=response, coherence=coherence, std=std,
         command=command, feedback=feedback, amplitude=excitation.size, realisations=realisations,
