@@ -138,6 +138,58 @@ class Experiment:
             part = variants[first : first + _CHUNK]
             yield from run_all([(self, variant) for variant in part], progress, threads)
 
+    def stepped(
+        self,
+        law: Callable[[int, Floats], float],
+        port: str,
+        signals: Sequence[str],
+        times: Floats,
+        variant: Variant = Variant(),
+    ) -> Floats:
+        """Run with an input that a law sets from what it reads, instant by instant.
+
+        Parameters
+        ----------
+        law : callable
+            Of the instant's number and the signals there, shape (k,); what it returns is held at
+            the port until the next instant, SI.
+        port : str
+            Which input.
+        signals : sequence of str
+            Of the model.
+        times : ndarray, shape (n,)
+            Instants, increasing from zero [s].
+        variant : Variant
+            How the run differs from the experiment.
+
+        Returns
+        -------
+        ndarray, shape (n, k + 1)
+            The signals at each instant, and what the law set there.
+
+        Raises
+        ------
+        InputError
+            The run leaves the finite numbers.
+        """
+        from elevon import _core
+
+        ready, wiring = self._varied(variant), self.actuator.wiring
+        core = _core.Session(wiring, self.fidelity, [ready.core], [], list(signals), "auto")
+        names = list(signal_records(wiring, self.fidelity))
+        places = [names.index(name) for name in signals]
+        steps = np.diff(np.round(times / core.step)).astype(np.int64).tolist()
+        out = np.empty((len(times), len(places) + 1))
+        for k, count in enumerate([*steps, 0]):
+            seen = core.read(places)[0]
+            value = law(k, seen)
+            out[k, :-1], out[k, -1] = seen, value
+            if count:
+                core.set_values(port, [value])
+                if core.advance(count):
+                    raise InputError(f"{self.log.name}: the run leaves the finite numbers")
+        return out
+
     def sensitivities(
         self, variant: Variant, paths: Sequence[str], progress: Progress | None = None
     ) -> dict[str, dict[str, Floats]]:

@@ -1,0 +1,1 @@
+"""An actuator identified subsystem by subsystem, each from its measured input and output."""

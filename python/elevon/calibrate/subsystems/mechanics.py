@@ -1,0 +1,421 @@
+"""Mechanics from measured effort and measured motion: the inverse model by linear regression.
+
+The torque that a motion needs is linear in its numbers: inertia times acceleration, viscous friction
+times speed, Coulomb friction in the direction of motion, a constant load. Derivatives are taken
+within a band in which they are motion and not noise; effort and regressors pass one filter and are
+thinned alike, so that the filter moves no number. Where a motion was commanded, its derivatives are
+the instrument: in a closed loop the sensor's noise comes back in the effort, and least squares alone
+would take it for friction and inertia (Janot, Vandanjon, Gautier 2014: an instrumental variable
+approach for rigid industrial robots).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from elevon.arrays import Bools, Floats
+from elevon.calibrate.subsystems.signals import REST, DriveSignals, useful_band
+from elevon.errors import InputError
+from elevon.estimate import Estimate
+from elevon.estimate.regression import Regression, regressed, with_deviations
+
+NAMES = ("inertia", "viscous", "coulomb", "offset")
+ONE_WAY = ("inertia", "viscous", "offset")
+BANDS = (0.6, 1.6)  # of the band: other choices that no log settles. ASSUMED
+ROUNDS = 2  # of runs of the model for an instrument
+THINNED = 2.5  # bands that the thinned rate holds: 0.8 of its half is the band. ASSUMED
+MOVING = 0.9  # of a filter's weight that must stem from samples in motion
+INSTRUMENT = 0.5  # of a regressor's variance that the commanded motion must explain
+HAUSMAN = 2.0  # deviations between both estimates from which least squares counts as biased
+SHARE = 0.2  # of a number: a deviation beyond which it is not determined
+DISAGREE = 3.0  # deviations between two groups of logs that are said
+#: Terms beyond the four: what else the residual is tried for.
+EXTRAS = ("stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
+SEEN = 4.0  # deviations from which a further term is reported, ...
+WORTH = 0.01  # ... and the share of the residual's variance that it explains
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The inverse model's rows of one log, thinned.
+
+    Attributes
+    ----------
+    name : str
+        Of the log.
+    time, speed, effort : ndarray, shape (n,)
+        s, rad/s, torque [N m] or the effort's unit.
+    columns, instrument : ndarray, shape (n, 4)
+        Of the regressors `NAMES`, and of those that were commanded; None without a command.
+    position : ndarray, shape (n,)
+        rad.
+    load : ndarray or None
+        As logged.
+    period : float
+        s.
+    """
+
+    name: str
+    time: Floats
+    speed: Floats
+    position: Floats
+    effort: Floats
+    columns: Floats
+    instrument: Floats | None
+    load: Floats | None
+    period: float
+
+    @property
+    def strokes(self) -> tuple[Floats, Floats, float]:
+        """Instants, speeds and period, for blocks of correlated residuals."""
+        return self.time, self.speed, self.period
+
+    @property
+    def direction(self) -> int:
+        """1 or -1 where the log moves in one direction only, else 0."""
+        share = float(np.mean(self.speed > 0.0))
+        return 1 if share > 0.98 else -1 if share < 0.02 else 0
+
+
+@dataclass(frozen=True)
+class Mechanics:
+    """What effort and motion determine.
+
+    Attributes
+    ----------
+    regression : Regression
+        Of the names in `NAMES` (in `ONE_WAY`, where nothing reverses), for one unit of effort.
+    band : float
+        Hz.
+    method : str
+        ``instrument`` or ``least squares``.
+    separate : mapping of str to Estimate triples
+        Each log's numbers, and those of each direction where the logs move one way each.
+    extras : mapping of str to Estimate
+        Further terms that the residual shows.
+    curve : ndarray, shape (k, 4)
+        Speed [rad/s], friction and its deviation, samples, by bins of speed.
+    residual : list of (str, ndarray, ndarray, ndarray, ndarray)
+        By log: time, speed, measured and predicted effort.
+    findings : tuple of str
+        What to know.
+    """
+
+    regression: Regression
+    band: float
+    method: str
+    separate: dict[str, dict[str, Estimate]] = field(default_factory=dict)
+    extras: dict[str, Estimate] = field(default_factory=dict)
+    curve: Floats = field(default_factory=lambda: np.empty((0, 4)))
+    residual: list[tuple[str, Floats, Floats, Floats, Floats]] = field(default_factory=list)
+    findings: tuple[str, ...] = ()
+
+    def estimate(self, name: str) -> Estimate | None:
+        """Return a number, None where the logs do not have it."""
+        return self.regression.estimate(name) if name in self.regression.names else None
+
+    def determined(self, name: str) -> bool:
+        """Return whether the data narrowed a number."""
+        item = self.estimate(name)
+        if item is None or not np.isfinite(item.std):
+            return False
+        if name == "offset":  # its size says nothing: the friction's or the inertia's does
+            size = self.estimate("coulomb")
+            return item.std < SHARE * max(abs(item.value), abs(size.value) if size else 0.0)
+        return item.value > 0.0 and item.std < SHARE * item.value
+
+
+def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> Rows:
+    """Return the rows of a log within a band [Hz], the effort read `shift` seconds later."""
+    position, speed, acceleration = drive.derivatives(band)
+    effort = drive.effort
+    if shift:
+        effort = np.interp(drive.time + shift, drive.time, effort)
+    moving = (np.abs(speed) > REST * float(np.abs(speed).max())) & drive.good
+    one = np.ones_like(speed)
+    columns = np.column_stack([acceleration, speed, np.sign(speed), one])
+    asked = drive.noiseless(band)
+    count = max(1, int(drive.rate / (THINNED * band)))
+    both = [columns, effort[:, None], position[:, None], moving[:, None].astype(np.float64)]
+    if asked is not None:
+        both.append(np.column_stack([asked[1], asked[0], np.sign(asked[0]), one]))
+    load = drive.load
+    if load is not None:
+        both.append(load[:, None])
+    table = _thinned(np.hstack(both), count, drive.rate)
+    keep = _inside(table, drive, count) & (table[:, 6] > MOVING)
+    table, time = table[keep], drive.time[::count][keep]
+    instrument = table[:, 7:11] if asked is not None else None
+    return Rows(
+        drive.name, time, table[:, 1], table[:, 5], table[:, 4], table[:, :4], instrument,
+        table[:, -1] if load is not None else None, drive.period * count,
+    )  # fmt: skip
+
+
+def _thinned(table: Floats, count: int, rate: float) -> Floats:
+    """Return every `count`-th row behind one filter for all columns."""
+    from scipy.signal import butter, sosfiltfilt
+
+    if count == 1:
+        return table
+    sections = butter(4, 0.4 * rate / count, fs=rate, output="sos")
+    return np.asarray(sosfiltfilt(sections, table, axis=0)[::count])
+
+
+def _inside(table: Floats, drive: DriveSignals, count: int) -> Bools:
+    """Leave out the ends, where filters that run both ways have no past or no future."""
+    edge = max(2, round(0.05 / (drive.period * count)))
+    inside = np.zeros(len(table), dtype=np.bool_)
+    inside[edge : len(table) - edge] = True
+    return inside
+
+
+#: Speed [rad/s] of the model with some numbers, driven by the effort of a log.
+OwnMotion = Callable[[DriveSignals, Mapping[str, float]], Floats]
+
+
+def identify_mechanics(
+    drives: Sequence[DriveSignals], own_motion: OwnMotion | None = None
+) -> Mechanics:
+    """Estimate inertia, friction and constant load from the effort of logs.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSignals
+        Of one machine.
+    own_motion : callable, optional
+        Runs the model on the effort of a log: the instrument where no motion was commanded.
+
+    Raises
+    ------
+    InputError
+        Nothing moves enough.
+    """
+    found = _identified(drives)
+    if own_motion is None or any(drive.noiseless(1.0) is not None for drive in drives):
+        return found
+    for _ in range(ROUNDS):
+        numbers = {name: found.regression[name] for name in found.regression.names}
+        if not (numbers["inertia"] > 0.0 and numbers["viscous"] >= 0.0):
+            return found
+        driven = [replace(drive, model_speed=own_motion(drive, numbers)) for drive in drives]
+        found = _identified(driven)
+    return found
+
+
+def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
+    """Return the regression of the mechanics with its intervals.
+
+    Raises
+    ------
+    InputError
+        Nothing moves enough.
+    """
+    band = min(useful_band(drive) for drive in drives)
+    rows = [mechanics_rows(drive, band) for drive in drives]
+    rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
+    if not rows:
+        raise InputError("the mechanics: no log moves for long enough")
+    names = NAMES if _reverses(rows) else ONE_WAY
+    regression, method, other = _regression(rows, names)
+    if not np.isfinite(regression.covariance).all():
+        raise InputError("the mechanics: the motion does not tell inertia from friction")
+    choices = [0.5 * (regression.value + other)] if method == "instrument" else []
+    for factor in BANDS:
+        varied = [mechanics_rows(drive, factor * band) for drive in drives]
+        choices.append(_regression(varied, names, method)[0].value)
+    half = 0.5 * drives[0].period
+    late = [_regression([mechanics_rows(d, band, s) for d in drives], names, method)[0].value
+            for s in (-half, half)]  # fmt: skip
+    # Both shifts are one unknown: half their difference is its deviation's bound.
+    choices.append(regression.value + (late[1] - late[0]) / (2.0 * 3.0**0.5))
+    regression = regression.open_to(choices)
+    separate = _separate(rows, names, method)
+    regression, findings = _between(regression, separate, len(rows))
+    extras, seen = _extras(rows, regression)
+    return Mechanics(
+        regression, band, method, separate, extras, _friction_curve(rows, regression),
+        _residuals(rows, regression), (*findings, *seen, *_confounded(rows, names)),
+    )  # fmt: skip
+
+
+def _reverses(rows: Sequence[Rows]) -> bool:
+    directions = {item.direction for item in rows}
+    return 0 in directions or len(directions) > 1
+
+
+def _chosen(item: Rows, names: tuple[str, ...], instrument: bool = False) -> Floats:
+    table = item.instrument if instrument else item.columns
+    assert table is not None
+    return table[:, [NAMES.index(name) for name in names]]
+
+
+def _regression(
+    rows: Sequence[Rows], names: tuple[str, ...], method: str | None = None
+) -> tuple[Regression, str, Floats | None]:
+    """Return the regression, how it was done, and what the other way gives where both can be."""
+    strokes = [item.strokes for item in rows]
+    design = [_chosen(item, names) for item in rows]
+    data = [item.effort for item in rows]
+    plain = regressed(names, design, data, strokes, robust=False)
+    if method == "least squares" or any(item.instrument is None for item in rows):
+        return plain, "least squares", None
+    stack, target = np.vstack(design), np.concatenate(data)
+    instrument = np.vstack([_chosen(item, names, instrument=True) for item in rows])
+    size = np.maximum(np.linalg.norm(instrument, axis=0), 1e-300)
+    weights = np.linalg.lstsq(instrument / size, stack, rcond=None)[0]
+    through = (instrument / size) @ weights
+    left = np.var(stack - through, axis=0)
+    strength = 1.0 - left / np.maximum(np.var(stack, axis=0), 1e-300)
+    moving = [k for k, name in enumerate(names) if name != "offset"]
+    if method is None and not np.all(strength[moving] > INSTRUMENT):
+        return plain, "least squares", None
+    scale = np.maximum(np.linalg.norm(through, axis=0), 1e-300)
+    value = np.linalg.lstsq(through / scale, target, rcond=None)[0] / scale
+    residual = target - stack @ value
+    clean = with_deviations(names, value, through, residual, np.ones(len(target)), strokes=strokes)
+    clean = replace(clean, explained=1.0 - float(np.var(residual) / np.var(target)))
+    if method is None:
+        gap = np.abs(clean.value - plain.value)
+        if not np.any(gap > HAUSMAN * np.sqrt(np.diag(clean.covariance))):
+            return plain, "least squares", clean.value
+    return clean, "instrument", plain.value
+
+
+def _separate(
+    rows: Sequence[Rows], names: tuple[str, ...], method: str
+) -> dict[str, dict[str, Estimate]]:
+    """Return the numbers of each log alone, and of each direction where logs move one way."""
+    groups = {item.name: [item] for item in rows} if len(rows) > 1 else {}
+    for sign, name in ((1, "forwards"), (-1, "backwards")):
+        one_way = [item for item in rows if item.direction == sign]
+        if one_way and len(one_way) < len(rows):
+            groups[name] = one_way
+    out = {}
+    for name, items in groups.items():
+        known = names if _reverses(items) else tuple(n for n in names if n != "coulomb")
+        found = _regression(items, known, method)[0]
+        if np.isfinite(found.covariance).all():
+            out[name] = {part: found.estimate(part) for part in known}
+    return out
+
+
+def _between(
+    regression: Regression, separate: dict[str, dict[str, Estimate]], count: int
+) -> tuple[Regression, list[str]]:
+    """Widen by what differs from log to log, and say where two directions disagree."""
+    findings = []
+    names = [n for n in regression.names if n not in {"offset"}]
+    for name in names:
+        forwards, backwards = (separate.get(d, {}).get(name) for d in ("forwards", "backwards"))
+        if forwards is None or backwards is None:
+            continue
+        gap = abs(forwards.value - backwards.value)
+        if gap > DISAGREE * float(np.hypot(forwards.std, backwards.std)):
+            findings.append(
+                f"{name}: {forwards.value:.4g} forwards, {backwards.value:.4g} backwards: the "
+                "directions disagree; a value for both describes neither"
+            )
+    covariance = regression.covariance.copy()
+    for k, name in enumerate(regression.names):
+        alone = [v[name].value for key, v in separate.items()
+                 if name in v and key not in {"forwards", "backwards"}]  # fmt: skip
+        if len(alone) > 1 and not (name == "offset" and "coulomb" not in separate):
+            covariance[k, k] = max(covariance[k, k], float(np.var(alone, ddof=1)) / len(alone))
+    return replace(regression, covariance=covariance), findings
+
+
+def _extras(rows: Sequence[Rows], regression: Regression) -> tuple[dict[str, Estimate], list[str]]:
+    """Return further terms that the residual shows, one at a time, and their words."""
+    names, found, texts = regression.names, {}, []
+    top = max(float(np.abs(item.speed).max()) for item in rows)
+    for name in EXTRAS:
+        columns = [_extra(name, item, top) for item in rows]
+        if any(column is None for column in columns):
+            continue
+        design = [
+            np.column_stack([_chosen(item, names), column])
+            for item, column in zip(rows, columns, strict=True)
+        ]
+        data = [item.effort for item in rows]
+        tried = regressed((*names, name), design, data, [r.strokes for r in rows], robust=False)
+        if not np.isfinite(tried.covariance).all():
+            continue
+        item = tried.estimate(name)
+        less = 1.0 - (1.0 - tried.explained) / max(1.0 - regression.explained, 1e-300)
+        if abs(item.value) > SEEN * item.std and less > WORTH:
+            found[name] = item
+            texts.append(
+                f"{name}: {item.value:.4g} +- {item.std:.2g} explains {100 * less:.0f} % of what is left"
+            )
+    return found, texts
+
+
+def _extra(name: str, rows: Rows, top: float) -> Floats | None:
+    """Return the column of a further term."""
+    if name == "stribeck":
+        return np.asarray(np.sign(rows.speed) * np.exp(-((rows.speed / (0.05 * top)) ** 2)))
+    if name == "quadratic":
+        return np.asarray(rows.speed * np.abs(rows.speed))
+    if name == "spring":
+        return rows.position
+    if name == "load":
+        return rows.load
+    turns = np.ptp(rows.position) / (2.0 * np.pi)
+    if turns < 2.0:
+        return None
+    wave = np.cos if name == "ripple_cos" else np.sin
+    return np.asarray(wave(rows.position))
+
+
+def _confounded(rows: Sequence[Rows], names: tuple[str, ...]) -> list[str]:
+    """Say what looks alike in the logs, and what would tell it."""
+    texts = []
+    if "coulomb" not in names:
+        texts.append(
+            "Coulomb friction and a constant load cannot be told apart: nothing reverses; a motion "
+            "in both directions separates them"
+        )
+    else:
+        texts.append(
+            "a constant load and a difference of friction by direction look alike: 'offset' holds "
+            "both; the same motion under another known load, or with the axis turned over, "
+            "separates them"
+        )
+    return texts
+
+
+def _predicted(item: Rows, regression: Regression) -> Floats:
+    return np.asarray(_chosen(item, regression.names) @ regression.value)
+
+
+def _residuals(
+    rows: Sequence[Rows], regression: Regression
+) -> list[tuple[str, Floats, Floats, Floats, Floats]]:
+    return [
+        (item.name, item.time, item.speed, item.effort, _predicted(item, regression))
+        for item in rows
+    ]
+
+
+def _friction_curve(rows: Sequence[Rows], regression: Regression, bins: int = 24) -> Floats:
+    """Return the effort less what inertia and constant load take, by bins of speed."""
+    speed = np.concatenate([item.speed for item in rows])
+    inertia = regression.names.index("inertia")
+    offset = regression["offset"] if "coulomb" in regression.names else 0.0
+    friction = np.concatenate(
+        [item.effort - regression.value[inertia] * item.columns[:, 0] - offset for item in rows]
+    )
+    edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, bins + 1)))
+    place = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, len(edges) - 2)
+    out = []
+    for k in range(len(edges) - 1):
+        part = friction[place == k]
+        if len(part) > 2:
+            out.append(
+                [speed[place == k].mean(), part.mean(), part.std() / len(part) ** 0.5, len(part)]
+            )
+    return np.array(out).reshape(-1, 4)
