@@ -1,8 +1,9 @@
 """The doors `elevon.calibrate` and `elevon.validate`: logs and records choose the way.
 
-An actuator with a control unit of its own, a servo with a preloaded screw that its logs weigh, a
-turning output with set point and both positions logged: each has its balances. Whatever else was
-logged is fitted in closed loop.
+Each subsystem is identified from what was measured at its input and at its output
+(`subsystems.flow`). An actuator with a control unit of its own, a servo with a preloaded screw that
+its logs weigh, a turning output with set point and both positions logged have further balances.
+Logs that show a command but not the law that follows it are fitted in closed loop.
 """
 
 from __future__ import annotations
@@ -16,7 +17,12 @@ from elevon.actuator import Actuator
 from elevon.calibrate.drops import is_drop_table, run_drops
 from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.validation import Validation
-from elevon.calibrate.ways import CalibrationRequest, ValidationRequest, way_of
+from elevon.calibrate.ways import (
+    CalibrationRequest,
+    ValidationRequest,
+    calibrate_any,
+    validate_any,
+)
 from elevon.logs.read import LogsLike, as_logs
 from elevon.progress import Progress
 from elevon.simulate.prepare import ActuatorLike, as_actuator
@@ -31,6 +37,7 @@ def calibrate(
     fidelity: str | None = None,
     transient: float | None = None,
     promise: bool = False,
+    torque_constant: str | float | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
     """Estimate what logs determine of an actuator.
@@ -52,6 +59,9 @@ def calibrate(
         Seconds left out at the beginning of each log.
     promise : bool
         Whether logs are held out in turn: what an actuator file takes its thresholds from.
+    torque_constant : str or float, optional
+        Torque at the motor for one unit of the logs' effort (``0.11 N m/A``), or force at a linear
+        output (``35.15 N/V``): the scale of inertia, friction and load. Default: the actuator's.
     progress : callable, optional
         Called with the done fraction; returns False to stop.
 
@@ -71,8 +81,10 @@ def calibrate(
     table = logs[0] if isinstance(logs, (list, tuple)) and len(logs) == 1 else logs
     if isinstance(table, (str, os.PathLike)) and is_drop_table(Path(table)):
         return run_drops(Path(table), model)
-    request = CalibrationRequest(model, free, per_log, fidelity, transient, promise, progress)
-    return _refused(way_of(as_logs(logs), model).calibrate(request))
+    request = CalibrationRequest(
+        model, free, per_log, fidelity, transient, promise, torque_constant, progress
+    )
+    return _refused(calibrate_any(as_logs(logs), request))
 
 
 def _refused(result: Calibration) -> Calibration:
@@ -121,5 +133,4 @@ def validate(
         A log that cannot be compared, a transient longer than a log.
     """
     model = as_actuator(actuator)
-    way = way_of(as_logs(logs), model, validating=True)
-    return way.validate(ValidationRequest(model, fidelity, transient, progress))
+    return validate_any(as_logs(logs), ValidationRequest(model, fidelity, transient, progress))

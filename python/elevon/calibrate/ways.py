@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time as clock
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -34,6 +35,7 @@ class CalibrationRequest:
     fidelity: str | None = None
     transient: float | None = None
     promise: bool = False
+    torque_constant: str | float | None = None
     progress: Progress | None = None
 
 
@@ -55,6 +57,81 @@ class CalibrationWay(Protocol):
 
     def validate(self, request: ValidationRequest) -> Validation:
         """Hold an actuator against the logs."""
+
+
+def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibration:
+    """Estimate what logs determine: subsystem by subsystem, in closed loop where that is needed.
+
+    Raises
+    ------
+    InputError
+        Logs that no way can read, or nothing determined.
+    """
+    from elevon.calibrate.subsystems.flow import calibrate_machine, identifiable, identify
+    from elevon.calibrate.subsystems.record import of_registers
+
+    begin = clock.perf_counter()
+    actuator = request.actuator
+    way, error = _way(logs, actuator)
+    machine = None
+    if (way is None or isinstance(way, _ClosedLoop)) and identifiable(logs, actuator):
+        try:
+            machine = identify(
+                logs, actuator, scale=request.torque_constant, progress=request.progress
+            )
+        except InputError:
+            if way is None:
+                raise
+    if machine is None and request.torque_constant is not None:
+        raise InputError(
+            "--set motor.torque_constant: these logs have no effort and motion that it would scale"
+        )
+    if machine is not None and (way is None or machine.settles(request.free)):
+        return calibrate_machine(machine, request.free, begin=begin)
+    if way is None:
+        assert error is not None
+        raise error
+    if machine is not None:
+        request = replace(request, actuator=machine.actuator)
+    result = way.calibrate(request)
+    parts = of_registers(result.estimates, result.undetermined)
+    if machine is not None:
+        parts |= {name: machine.subsystems[name] for name in ("electrics", "transmission")}
+        parts["mechanics"] = parts["mechanics"].beside(machine.subsystems["mechanics"])
+    return replace(result, facts={**result.facts, "subsystems": parts})
+
+
+def _way(
+    logs: Sequence[Log], actuator: Actuator, *, validating: bool = False
+) -> tuple[CalibrationWay | None, InputError | None]:
+    """Return the way that needs more than an effort and a motion; or why there is none."""
+    try:
+        way = way_of(logs, actuator, validating=validating)
+        if isinstance(way, _ClosedLoop):
+            way.logs  # noqa: B018 - read here, where an error is no end
+    except InputError as error:
+        return None, error
+    return way, None
+
+
+def validate_any(logs: Sequence[Log], request: ValidationRequest) -> Validation:
+    """Hold an actuator against logs, each subsystem driven by its measured input where it can be.
+
+    Raises
+    ------
+    InputError
+        Logs that no way can read.
+    """
+    from elevon.calibrate.subsystems.flow import identifiable, validate_machine
+
+    way, error = _way(logs, request.actuator, validating=True)
+    known = "law" in (request.actuator.validation or {})
+    if (way is None or known) and identifiable(logs, request.actuator):
+        return validate_machine(logs, request.actuator, progress=request.progress)
+    if way is None:
+        assert error is not None
+        raise error
+    return way.validate(request)
 
 
 def way_of(logs: Sequence[Log], actuator: Actuator, *, validating: bool = False) -> CalibrationWay:

@@ -86,6 +86,9 @@ def set_text(result: Calibration, *, name: str, base: str, validation: Validatio
             offsets.add(signal, float(f"{value:.6g}"))
         if validation.offsets:
             table.add("offsets", offsets)
+        law = (result.actuator.validation or {}).get("law")
+        if law is not None:
+            table.add("law", tomlkit.item(dict(law)))
         head.add("validation", table)
     return updated_set(tomlkit.dumps(head), calibrated_parameters(result))
 

@@ -42,19 +42,30 @@ def calibrate(
     common.check_outputs([out], force=force)
     if out is not None and out.suffix.lower() != ".toml":
         raise InputError(f"--out {out}: a set is a TOML file; end the name in .toml")
+    settings, constant = _scale(settings)
     model, paths = common.read_actuator(actuator, settings), _paths(free)
     table = len(logs) == 1 and is_drop_table(logs[0])
     given = logs if table else common.read_logs(logs, column_map, loadcell, command)
     with progress_bar("calibrating") as advance:
         result = run(
             given, model, paths, per_log=per_log or [], fidelity=fidelity, transient=transient,
-            promise=out is not None, progress=advance,
+            promise=out is not None, torque_constant=constant, progress=advance,
         )  # fmt: skip
         advance(1.0)
     if out is not None:
         say(f"set: {result.write_actuator(out, force=force)}")
     data = result.to_dict(stored=False) | {"out": None if out is None else str(out)}
     return Answer(data, lambda: _print(result), page=result.report)
+
+
+def _scale(settings: list[str] | None) -> tuple[list[str], str | None]:
+    """Take ``motor.torque_constant=VALUE`` out of the settings: the scale of the logs' effort."""
+    head = "motor.torque_constant="
+    given = [text for text in settings or () if text.replace(" ", "").startswith(head)]
+    if len(given) > 1:
+        raise InputError("--set motor.torque_constant is given twice")
+    rest = [text for text in settings or () if text not in given]
+    return rest, given[0].partition("=")[2].strip() if given else None
 
 
 def _paths(free: list[str] | None) -> list[str] | None:

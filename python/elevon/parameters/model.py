@@ -43,6 +43,21 @@ class ParameterEntry(Strict):
         return source
 
 
+class ControllerLaw(Strict):
+    """A drive's law of position as it was identified: effort from command and measured motion."""
+
+    structure: StrictStr = Field(description="`P-P`, `P-PI`, `PID`, ...")
+    effort: StrictStr = Field(description="Role of the effort that it sets")
+    scale: Number = Field(gt=0.0, description="Torque at the motor for one unit of effort [N m]")
+    gains: dict[str, Number] = Field(description="Effort for a unit of each term")
+    constant: Number = Field(0.0, description="Effort that is always added")
+    speed: StrictStr = Field(description="`difference`, `mean`, `filtered` or `measured`")
+    lag: Number = Field(0.0, ge=0.0, description="Samples of the filter of a filtered speed")
+    delay: int = Field(0, ge=0, description="Samples from what it reads to the effort")
+    period: Number = Field(gt=0.0, description="Seconds between two samples")
+    limit: Number | None = Field(None, description="Largest effort")
+
+
 class ValidationLimits(Strict):
     """What an actuator file promises of its agreement with a log."""
 
@@ -54,6 +69,9 @@ class ValidationLimits(Strict):
     offsets: dict[str, Number] = Field(
         default_factory=dict,
         description="Signal to the constant offset [SI] its sensor adds, taken off a log",
+    )
+    law: ControllerLaw | None = Field(
+        None, description="The drive's law of position, where calibration identified it"
     )
 
 

@@ -81,9 +81,11 @@ class SpeedEstimate:
     def text(self) -> str:
         """In words."""
         return {
-            "difference": "difference of two samples", "mean": "difference of the mean of two samples",
-            "measured": "as measured", "filtered": f"difference behind a filter of {self.lag:g} samples",
-        }[self.kind]  # fmt: skip
+            "difference": "difference of two samples",
+            "mean": "difference of the mean of two samples",
+            "measured": "as measured",
+            "filtered": f"difference behind a filter of {self.lag:g} samples",
+        }[self.kind]
 
 
 SPEEDS = (
@@ -255,6 +257,19 @@ def _law(
     )  # fmt: skip
 
 
+def load_gain(drive: DriveSignals) -> float | None:
+    """Return the effort that a unit of the logged load adds to a controller's output, if it does.
+
+    The law of the log itself tells it from what else moves the effort.
+    """
+    if drive.load is None or drive.command is None or drive.position is None:
+        return None
+    found, _ = identify_controller([drive])
+    if found is None or found.disturbance is None or not found.exact:
+        return None
+    return found.disturbance.value
+
+
 def _adds(normal: _Normal, terms: tuple[str, ...]) -> bool:
     """Return whether a unit of the logged load adds to the controller's output."""
     without, with_load = normal.held_out(terms), normal.held_out((*terms, "load"))
@@ -274,7 +289,8 @@ def _columns(drive: DriveSignals, of: str, speed: SpeedEstimate) -> dict[str, Fl
             "error": error, "integral": np.cumsum(error) * period,
             "derivative": np.diff(error, prepend=error[0]) / period,
         }  # fmt: skip
-    assert drive.command is not None and drive.position is not None
+    assert drive.command is not None
+    assert drive.position is not None
     error = drive.command - drive.position
     integral = np.cumsum(error) * period
     ahead = np.diff(drive.command, prepend=drive.command[0]) / period
@@ -381,31 +397,71 @@ class _Normal:
         return with_deviations(names, value, design, residual, weight, strokes=fine)
 
 
+@dataclass(frozen=True)
+class LawNumbers:
+    """A law of position in numbers: what an actuator file keeps of it.
+
+    Attributes
+    ----------
+    structure : str
+        ``P-P``, ``PID``, ...
+    gains : mapping of str to float
+        Effort per term.
+    constant : float
+        Effort.
+    speed : SpeedEstimate
+        How the drive computes it.
+    delay : int
+        Samples.
+    period : float
+        s.
+    limit : float or None
+        Of the effort.
+    """
+
+    structure: str
+    gains: Mapping[str, float]
+    constant: float
+    speed: SpeedEstimate
+    delay: int
+    period: float
+    limit: float | None
+
+    @classmethod
+    def of(cls, item: Controller) -> LawNumbers:
+        """Return the numbers of an identified controller."""
+        names, values = item.regression.names, item.regression.value
+        constants = [k for k, name in enumerate(names) if name.startswith("constant_")]
+        gains = {name: item.regression[name] for name in names if not name.startswith("constant_")}
+        return cls(
+            item.structure, gains, float(np.mean(values[constants])), item.speed, item.delay,
+            item.period, item.limit,
+        )  # fmt: skip
+
+
 class Law:
-    """An identified controller, sample by sample: what it reads, and the effort that it asks for.
+    """A controller of position, sample by sample: what it reads, and the effort it asks for.
 
     Parameters
     ----------
-    controller : Controller
-        Of a position.
+    numbers : LawNumbers
+        The law.
     command : ndarray, shape (n,)
         rad.
+    load : ndarray, optional
+        What acts on the controller's output, as logged.
     """
 
-    def __init__(self, controller: Controller, command: Floats) -> None:
-        self.controller, self.command = controller, command
-        self._gain = {name: controller.regression[name] for name in controller.terms}
-        names = controller.regression.names
-        constants = [k for k, name in enumerate(names) if name.startswith("constant_")]
-        self._constant = float(np.mean(controller.regression.value[constants]))
+    def __init__(self, numbers: LawNumbers, command: Floats, load: Floats | None = None) -> None:
+        self.numbers, self.command, self.load = numbers, command, load
         self._steps: deque[float] = deque([0.0, 0.0], maxlen=2)
-        self._waiting: deque[float] = deque(maxlen=controller.delay + 1)
+        self._waiting: deque[float] = deque(maxlen=numbers.delay + 1)
         self._last = self._first = np.nan
         self._error = self._integral = self._double = self._slow = 0.0
 
     def __call__(self, k: int, seen: Floats) -> float:
         """Return the effort at a sample, from position [rad] and speed [rad/s] there."""
-        place, period, item = float(seen[0]), self.controller.period, self.controller
+        place, period, item = float(seen[0]), self.numbers.period, self.numbers
         if k == 0:
             self._last = self._first = place
             self._error = float(self.command[0]) - place
@@ -423,15 +479,16 @@ class Law:
         change, self._error = (error - self._error) / period, error
         self._integral += error * period
         self._double += self._integral * period
-        before, earlier = self.command[max(k - 1, 0)], self.command[max(k - 2, 0)]
+        before, earlier = float(self.command[max(k - 1, 0)]), float(self.command[max(k - 2, 0)])
         ahead = (float(self.command[k]) - before) / period
         terms = {
             "error": error, "integral": self._integral, "speed": -speed, "derivative": change,
             "travel": self._first - place, "double": self._double, "speed_ahead": ahead,
-            "acceleration_ahead": (ahead - (before - earlier) / period) / period,
+            "acceleration_ahead": (ahead - (before - earlier) / period) / period, "load": 0.0,
         }  # fmt: skip
-        effort = self._constant + sum(gain * terms[name] for name, gain in self._gain.items())
+        effort = item.constant + sum(gain * terms[name] for name, gain in item.gains.items())
         if item.limit is not None:
             effort = min(max(effort, -item.limit), item.limit)
         self._waiting.append(effort)
-        return self._waiting[0]
+        added = 0.0 if self.load is None else item.gains.get("load", 0.0) * float(self.load[k])
+        return self._waiting[0] + added

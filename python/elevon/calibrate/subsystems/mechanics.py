@@ -1,12 +1,12 @@
 """Mechanics from measured effort and measured motion: the inverse model by linear regression.
 
-The torque that a motion needs is linear in its numbers: inertia times acceleration, viscous friction
-times speed, Coulomb friction in the direction of motion, a constant load. Derivatives are taken
-within a band in which they are motion and not noise; effort and regressors pass one filter and are
-thinned alike, so that the filter moves no number. Where a motion was commanded, its derivatives are
-the instrument: in a closed loop the sensor's noise comes back in the effort, and least squares alone
-would take it for friction and inertia (Janot, Vandanjon, Gautier 2014: an instrumental variable
-approach for rigid industrial robots).
+The torque that a motion needs is linear in its numbers: inertia times acceleration, viscous
+friction times speed, Coulomb friction in the direction of motion, a constant load. Derivatives are
+taken within a band in which they are motion and not noise; effort and regressors pass one filter
+and are thinned alike, so that the filter moves no number. The commanded motion, or the model's own
+where none was commanded, is the instrument: the sensor's noise comes back in the effort of a closed
+loop, and least squares alone would take it for friction and inertia (Janot, Vandanjon, Gautier
+2014: an instrumental variable approach for rigid industrial robots).
 """
 
 from __future__ import annotations
@@ -215,15 +215,18 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
         Nothing moves enough.
     """
     band = min(useful_band(drive) for drive in drives)
-    rows = [mechanics_rows(drive, band) for drive in drives]
-    rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
-    if not rows:
+    every = [(drive, mechanics_rows(drive, band)) for drive in drives]
+    every = [(drive, item) for drive, item in every if len(item.time) >= 4 * len(NAMES)]
+    if not every:
         raise InputError("the mechanics: no log moves for long enough")
+    drives, rows = [drive for drive, _ in every], [item for _, item in every]
     names = NAMES if _reverses(rows) else ONE_WAY
     regression, method, other = _regression(rows, names)
     if not np.isfinite(regression.covariance).all():
         raise InputError("the mechanics: the motion does not tell inertia from friction")
-    choices = [0.5 * (regression.value + other)] if method == "instrument" else []
+    choices = []
+    if method == "instrument" and other is not None:
+        choices.append(0.5 * (regression.value + other))
     for factor in BANDS:
         varied = [mechanics_rows(drive, factor * band) for drive in drives]
         choices.append(_regression(varied, names, method)[0].value)
@@ -234,11 +237,11 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     choices.append(regression.value + (late[1] - late[0]) / (2.0 * 3.0**0.5))
     regression = regression.open_to(choices)
     separate = _separate(rows, names, method)
-    regression, findings = _between(regression, separate, len(rows))
+    regression, findings = _between(regression, separate)
     extras, seen = _extras(rows, regression)
     return Mechanics(
         regression, band, method, separate, extras, _friction_curve(rows, regression),
-        _residuals(rows, regression), (*findings, *seen, *_confounded(rows, names)),
+        _residuals(rows, regression), (*findings, *seen, _confounded(names)),
     )  # fmt: skip
 
 
@@ -304,7 +307,7 @@ def _separate(
 
 
 def _between(
-    regression: Regression, separate: dict[str, dict[str, Estimate]], count: int
+    regression: Regression, separate: dict[str, dict[str, Estimate]]
 ) -> tuple[Regression, list[str]]:
     """Widen by what differs from log to log, and say where two directions disagree."""
     findings = []
@@ -333,8 +336,8 @@ def _extras(rows: Sequence[Rows], regression: Regression) -> tuple[dict[str, Est
     names, found, texts = regression.names, {}, []
     top = max(float(np.abs(item.speed).max()) for item in rows)
     for name in EXTRAS:
-        columns = [_extra(name, item, top) for item in rows]
-        if any(column is None for column in columns):
+        columns = [c for item in rows if (c := _extra(name, item, top)) is not None]
+        if len(columns) < len(rows):
             continue
         design = [
             np.column_stack([_chosen(item, names), column])
@@ -348,9 +351,8 @@ def _extras(rows: Sequence[Rows], regression: Regression) -> tuple[dict[str, Est
         less = 1.0 - (1.0 - tried.explained) / max(1.0 - regression.explained, 1e-300)
         if abs(item.value) > SEEN * item.std and less > WORTH:
             found[name] = item
-            texts.append(
-                f"{name}: {item.value:.4g} +- {item.std:.2g} explains {100 * less:.0f} % of what is left"
-            )
+            size = f"{item.value:.4g} +- {item.std:.2g}"
+            texts.append(f"{name}: {size} explains {100 * less:.0f} % of what is left")
     return found, texts
 
 
@@ -371,21 +373,18 @@ def _extra(name: str, rows: Rows, top: float) -> Floats | None:
     return np.asarray(wave(rows.position))
 
 
-def _confounded(rows: Sequence[Rows], names: tuple[str, ...]) -> list[str]:
+def _confounded(names: tuple[str, ...]) -> str:
     """Say what looks alike in the logs, and what would tell it."""
-    texts = []
     if "coulomb" not in names:
-        texts.append(
+        return (
             "Coulomb friction and a constant load cannot be told apart: nothing reverses; a motion "
             "in both directions separates them"
         )
-    else:
-        texts.append(
-            "a constant load and a difference of friction by direction look alike: 'offset' holds "
-            "both; the same motion under another known load, or with the axis turned over, "
-            "separates them"
-        )
-    return texts
+    return (
+        "a constant load and a difference of friction by direction look alike: 'offset' holds "
+        "both; the same motion under another known load, or with the axis turned over, separates "
+        "them"
+    )
 
 
 def _predicted(item: Rows, regression: Regression) -> Floats:

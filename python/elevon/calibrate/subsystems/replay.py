@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.log import motor_ratio
-from elevon.calibrate.subsystems.signals import DriveSignals
+from elevon.calibrate.subsystems.controller import Law, LawNumbers
+from elevon.calibrate.subsystems.signals import DriveSignals, useful_band
 from elevon.errors import InputError
 from elevon.experiment import Experiment, Inputs, Variant
 from elevon.logs.log import Log
@@ -87,9 +87,7 @@ def plant_experiment(
 
 
 def _states(drive: DriveSignals) -> tuple[Floats, Floats, Floats]:
-    """Return position, speed and acceleration in a band that keeps a window's start free of noise."""
-    from elevon.calibrate.subsystems.signals import useful_band
-
+    """Return position, speed and acceleration within the band that is free of noise."""
     return drive.derivatives(useful_band(drive))
 
 
@@ -116,111 +114,72 @@ def free_run(drive: DriveSignals, actuator: Actuator, torque: Floats) -> tuple[F
     return position, speed
 
 
-def window_errors(
+def window_runs(
     drive: DriveSignals, actuator: Actuator, torque: Floats, window: float = WINDOW
-) -> tuple[float, float]:
-    """Return RMS errors of position [rad] and speed [rad/s] over windows that begin as measured."""
-    position, speed, _ = _states(drive)
-    count = max(round(window / drive.period), 8)
-    starts = np.arange(0, len(drive.time) - count, count)
-    experiment = plant_experiment(drive, actuator, torque, count * drive.period)
-    ratio = motor_ratio(actuator)
-    times = drive.time[: count + 1]
-    variants = [
-        Variant(
-            loads={"shaft": (times, -torque[k : k + count + 1])},
-            initial=_begin(float(position[k]), float(speed[k]), ratio),  # type: ignore[arg-type]
-        )
-        for k in starts
-    ]
-    errors = []
-    for k, run in zip(starts, experiment.run(variants), strict=True):
-        if not run.complete:
-            continue
-        part = slice(k, k + count)
-        for name, data in zip(_SHOWN, (position, speed), strict=True):
-            errors.append(np.interp(times[:-1], run.log.time, run.log[name]) - data[part])
-    if not errors:
-        return float("nan"), float("nan")
-    of_position, of_speed = np.concatenate(errors[::2]), np.concatenate(errors[1::2])
-    return float(np.sqrt(np.mean(of_position**2))), float(np.sqrt(np.mean(of_speed**2)))
-
-
-@dataclass(frozen=True, eq=False)
-class ClosedLoop:
-    """A run of the plant under an identified law, on the log's instants.
-
-    Attributes
-    ----------
-    name : str
-        Of the log.
-    time, position, effort : ndarray, shape (n,)
-        s, rad, effort's unit.
-    measured_position, measured_effort : ndarray, shape (n,)
-        What the log has.
-    position_rms : float
-        RMS error of the position [rad].
-    effort_share : float
-        RMS error of the effort over its own RMS.
-    """
-
-    name: str
-    time: Floats
-    position: Floats
-    effort: Floats
-    measured_position: Floats
-    measured_effort: Floats
-    position_rms: float
-    effort_share: float
-
-
-def closed_loop(
-    drive: DriveSignals,
-    actuator: Actuator,
-    law: Callable[[int, Floats], float],
-    scale: float,
-    disturbance: Floats | None = None,
-    settle: int = 50,
-) -> ClosedLoop:
-    """Run the plant under a law that reads the motor's position and speed at each sample.
+) -> tuple[Floats, Floats]:
+    """Return position [rad] and speed [rad/s] over windows that begin as measured.
 
     Parameters
     ----------
     drive : DriveSignals
-        Whose command the law follows.
+        The log.
+    actuator : Actuator
+        The model.
+    torque : ndarray, shape (n,)
+        Measured, of the motor [N m].
+    window : float
+        Length of a window [s].
+
+    Returns
+    -------
+    ndarray, ndarray, shape (n,)
+        NaN in what is left at the end, and in a window whose run does not stay finite.
+    """
+    position, speed, _ = _states(drive)
+    count = max(round(window / drive.period), 8)
+    starts = range(0, len(drive.time) - count, count)
+    experiment = plant_experiment(drive, actuator, torque, count * drive.period)
+    ratio, times = motor_ratio(actuator), drive.time[: count + 1]
+    variants = [
+        Variant(
+            loads={"shaft": (times, -torque[k : k + count + 1])},
+            initial={name: float(value) for name, value in
+                     _begin(float(position[k]), float(speed[k]), ratio).items()},
+        )
+        for k in starts
+    ]  # fmt: skip
+    out = np.full((2, len(drive.time)), np.nan)
+    for k, run in zip(starts, experiment.run(variants), strict=True):
+        if run.complete:
+            for row, name in enumerate(_SHOWN):
+                out[row, k : k + count] = np.interp(times[:-1], run.log.time, run.log[name])
+    return out[0], out[1]
+
+
+def closed_loop(
+    drive: DriveSignals, actuator: Actuator, law: LawNumbers, scale: float
+) -> tuple[Floats, Floats]:
+    """Return position [rad] and effort of the plant under a law, on the log's instants.
+
+    Parameters
+    ----------
+    drive : DriveSignals
+        Whose command the law follows; its load acts where the law has a gain for it.
     actuator : Actuator
         The plant.
-    law : callable
-        Of the sample's number, and position [rad] and speed [rad/s] there; the effort.
+    law : LawNumbers
+        Of the effort.
     scale : float
         Torque of one unit of effort [N m].
-    disturbance : ndarray, optional
-        Added to the effort, its unit.
-    settle : int
-        Samples at the beginning that are not compared.
     """
-    assert drive.position is not None
-    added = np.zeros(len(drive.time)) if disturbance is None else disturbance
-    zero = np.zeros(len(drive.time))
+    assert drive.command is not None
+    controller = Law(law, drive.command, drive.load)
     efforts = np.empty(len(drive.time))
 
     def set_torque(k: int, seen: Floats) -> float:
-        efforts[k] = law(k, seen) + added[k]
+        efforts[k] = controller(k, seen)
         return -scale * float(efforts[k])
 
-    experiment = plant_experiment(drive, actuator, zero)
+    experiment = plant_experiment(drive, actuator, np.zeros(len(drive.time)))
     out = experiment.stepped(set_torque, "shaft", tuple(_SHOWN), drive.time)
-    position = out[:, 0]
-    part = slice(settle, None)
-    error = (position - drive.position)[part]
-    off = (efforts - drive.effort)[part]
-    size = float(np.sqrt(np.mean(drive.effort[part] ** 2)))
-    return ClosedLoop(
-        drive.name, drive.time, position, efforts, drive.position, drive.effort,
-        float(np.sqrt(np.mean(error**2))), float(np.sqrt(np.mean(off**2))) / max(size, 1e-300),
-    )  # fmt: skip
-
-
-def total(errors: Sequence[float]) -> float:
-    """Return the root of the mean square of errors."""
-    return float(np.sqrt(np.mean(np.square(errors)))) if errors else float("nan")
+    return out[:, 0], efforts

@@ -13,7 +13,6 @@ from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.errors import InputError
 from elevon.logs.log import Log, bridged
-from elevon.parameters.records import record_of
 from elevon.parameters.relations import emf_constant, motor_torque_constant
 from elevon.scenario.compile import signal_records
 from elevon.units import parse_quantity
@@ -31,6 +30,7 @@ FEWEST = 200  # samples. ASSUMED: 4 numbers and their covariance need some tens 
 #: the 1 % that a mass is to be known to
 NOISE_SHARE = 0.003
 LOWEST_BAND, HIGHEST_BAND = 0.02, 0.2  # of the sampling rate
+JITTER = 0.3  # of a period: stamps that differ by less are those of a regular clock. ASSUMED
 GAP = 3.0  # periods: a longer pause between two samples is a gap
 REST = 0.01  # of the largest speed: below it friction is whatever holds
 
@@ -127,7 +127,7 @@ class DriveSignals:
 
 
 def low_pass(values: Floats, band: float, rate: float) -> Floats:
-    """Return values behind a Butterworth filter that runs both ways; as they are above its reach."""
+    """Return values behind a Butterworth filter that runs both ways."""
     from scipy.signal import butter, sosfiltfilt
 
     if band >= 0.45 * rate:
@@ -163,14 +163,12 @@ def scale_of(text: str | float, actuator: Actuator, unit: str) -> float:
         raise InputError(
             f"--set {SCALE}={text}: the effort that the logs have is in {unit}, not in {bottom}"
         )
-    ratio = 1.0
     try:
         force = top.strip().endswith("N") and linear(actuator)
         value = parse_quantity(f"{number} {top or 'N m'}", "N" if force else "N m", SCALE)
     except InputError as error:
         raise InputError(f"--set {SCALE}={text}: {error}") from None
-    if force:
-        ratio = motor_ratio(actuator)
+    ratio = motor_ratio(actuator) if force else 1.0
     if not value > 0.0 or not math.isfinite(value):
         raise InputError(f"--set {SCALE}={text}: must be above 0")
     return value / ratio
@@ -206,7 +204,6 @@ def with_scale(actuator: Actuator, effort: Effort | None, scale: str | float | N
     values: dict[str, str | float] = {"motor.emf_constant": emf_constant(effort.scale)}
     if "control.torque_constant" in actuator.parameters:
         values["control.torque_constant"] = effort.scale
-    record_of(actuator.wiring, "motor.emf_constant")
     return actuator.with_values(values, source=f"--set {SCALE}={scale}", place="--set")
 
 
@@ -227,6 +224,11 @@ def drive_signals(log: Log, actuator: Actuator, role: str) -> DriveSignals:
     if len(log.time) < FEWEST:
         raise InputError(f"{log.name}: {len(log.time)} samples; the mechanics need {FEWEST}")
     period, ratio = log.period, motor_ratio(actuator)
+    # A clock that only jitters counts the drive's samples: none is moved between its neighbours.
+    ticking = bool(np.all(np.abs(np.diff(log.time) / period - 1.0) < JITTER))
+    if ticking:
+        period = log.duration / (len(log.time) - 1)
+        log = replace(log, time=period * np.arange(len(log.time)))
     time = np.arange(0.0, log.duration + 0.5 * period, period)
     needed = np.isfinite(log[motion]) & np.isfinite(log[role]) & log.good
     known = log.time[needed]
