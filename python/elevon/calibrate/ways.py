@@ -67,8 +67,9 @@ def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibrati
     InputError
         Logs that no way can read, or nothing determined.
     """
+    from elevon.calibrate.subsystems.controller import EXPLAINED
     from elevon.calibrate.subsystems.flow import calibrate_machine, identifiable, identify
-    from elevon.calibrate.subsystems.record import of_registers
+    from elevon.calibrate.subsystems.record import NOT, of_registers
 
     begin = clock.perf_counter()
     actuator = request.actuator
@@ -76,8 +77,10 @@ def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibrati
     machine = None
     if (way is None or isinstance(way, _ClosedLoop)) and identifiable(logs, actuator):
         try:
+            late = request.transient
+            counted = logs if late is None else [log.after(late) for log in logs]
             machine = identify(
-                logs, actuator, scale=request.torque_constant, progress=request.progress
+                counted, actuator, scale=request.torque_constant, progress=request.progress
             )
         except InputError:
             if way is None:
@@ -87,6 +90,7 @@ def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibrati
             "--set motor.torque_constant: these logs have no effort and motion that it would scale"
         )
     if machine is not None and (way is None or machine.settles(request.free)):
+        _check_machine(request)
         return calibrate_machine(machine, request.free, begin=begin)
     if way is None:
         assert error is not None
@@ -94,11 +98,37 @@ def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibrati
     if machine is not None:
         request = replace(request, actuator=machine.actuator)
     result = way.calibrate(request)
+    if machine is not None and request.free is None:
+        explained = _explained(result)
+        if explained < EXPLAINED and machine.subsystems["mechanics"].status != NOT:
+            machine.without_controller(explained)
+            return calibrate_machine(machine, begin=begin)
     parts = of_registers(result.estimates, result.undetermined)
     if machine is not None:
         parts |= {name: machine.subsystems[name] for name in ("electrics", "transmission")}
         parts["mechanics"] = parts["mechanics"].beside(machine.subsystems["mechanics"])
     return replace(result, facts={**result.facts, "subsystems": parts})
+
+
+def _explained(result: Calibration) -> float:
+    """Return the share of the current's variance that a closed loop explains on data held out."""
+    rows = [] if result.promise is None else result.promise.errors
+    shares = [(0.01 * row.of_rms) ** 2 for row in rows if row.signal in {"current", "voltage"}]
+    return 1.0 - sum(shares) / len(shares) if shares else 1.0
+
+
+def _check_machine(request: CalibrationRequest) -> None:
+    """Refuse what regressions of subsystems have no meaning for."""
+    if request.fidelity is not None:
+        raise InputError(
+            f"--fidelity {request.fidelity}: these logs are read by regressions, subsystem by "
+            "subsystem; leave it out"
+        )
+    if request.per_log:
+        raise InputError(
+            "--per-log: these logs are read by regressions, and each log's own numbers are listed "
+            "beside those of all; leave it out"
+        )
 
 
 def _way(

@@ -41,10 +41,15 @@ def calibrated_parameters(result: Calibration) -> list[Parameter]:
             changes.append(Parameter(path, entry.value, unit, source_before, "", "assumed"))
             continue
         if item is None:
-            note = f"not determined: {reasons[path]}" if path in reasons else _followed(path)
-            changes.append(
-                Parameter(path, entry.value, unit, source, note, "calibrated", old.value)
-            )
+            # `calibrated` is what the data narrowed: what moved with it is not.
+            if path in reasons:
+                note = f"not determined: {reasons[path]}"
+                whence = f"ASSUMED: moved with what was {source}"
+                moved = Parameter(path, entry.value, unit, whence, note, "assumed", old.value)
+            else:
+                note = _followed(path)
+                moved = Parameter(path, entry.value, unit, source, note, "derived", old.value)
+            changes.append(moved)
             continue
         given = f"; holds for {', '.join(item.given)} as given" if item.given else ""
         note = f"{item.note}{'; ' if item.note else ''}{100 * LEVEL:.0f} % interval{given}"

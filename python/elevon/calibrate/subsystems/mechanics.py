@@ -30,7 +30,9 @@ THINNED = 2.5  # bands that the thinned rate holds: 0.8 of its half is the band.
 MOVING = 0.9  # of a filter's weight that must stem from samples in motion
 INSTRUMENT = 0.5  # of a regressor's variance that the commanded motion must explain
 HAUSMAN = 2.0  # deviations between both estimates from which least squares counts as biased
-SHARE = 0.2  # of a number: a deviation beyond which it is not determined
+#: Of a number: a deviation beyond which it is not determined. ASSUMED: at half the number the
+#: interval of 90 % just leaves out zero
+SHARE = 0.5
 DISAGREE = 3.0  # deviations between two groups of logs that are said
 #: Terms beyond the four: what else the residual is tried for.
 EXTRAS = ("stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
@@ -102,6 +104,10 @@ class Mechanics:
         By log: time, speed, measured and predicted effort.
     findings : tuple of str
         What to know.
+    direction : int
+        1 or -1 where nothing but one direction was logged.
+    effort_rms : float
+        Of the logs.
     """
 
     regression: Regression
@@ -112,6 +118,8 @@ class Mechanics:
     curve: Floats = field(default_factory=lambda: np.empty((0, 4)))
     residual: list[tuple[str, Floats, Floats, Floats, Floats]] = field(default_factory=list)
     findings: tuple[str, ...] = ()
+    direction: int = 0
+    effort_rms: float = 0.0
 
     def estimate(self, name: str) -> Estimate | None:
         """Return a number, None where the logs do not have it."""
@@ -122,9 +130,8 @@ class Mechanics:
         item = self.estimate(name)
         if item is None or not np.isfinite(item.std):
             return False
-        if name == "offset":  # its size says nothing: the friction's or the inertia's does
-            size = self.estimate("coulomb")
-            return item.std < SHARE * max(abs(item.value), abs(size.value) if size else 0.0)
+        if name == "offset":  # may be zero: the effort's size says what is little
+            return item.std < SHARE * self.effort_rms
         return item.value > 0.0 and item.std < SHARE * item.value
 
 
@@ -218,7 +225,7 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     every = [(drive, mechanics_rows(drive, band)) for drive in drives]
     every = [(drive, item) for drive, item in every if len(item.time) >= 4 * len(NAMES)]
     if not every:
-        raise InputError("the mechanics: no log moves for long enough")
+        raise InputError("the mechanics: no log moves for long enough to be read")
     drives, rows = [drive for drive, _ in every], [item for _, item in every]
     names = NAMES if _reverses(rows) else ONE_WAY
     regression, method, other = _regression(rows, names)
@@ -242,6 +249,8 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     return Mechanics(
         regression, band, method, separate, extras, _friction_curve(rows, regression),
         _residuals(rows, regression), (*findings, *seen, _confounded(names)),
+        0 if "coulomb" in names else rows[0].direction,
+        float(np.sqrt(np.mean(np.concatenate([item.effort**2 for item in rows])))),
     )  # fmt: skip
 
 
@@ -260,6 +269,9 @@ def _regression(
     rows: Sequence[Rows], names: tuple[str, ...], method: str | None = None
 ) -> tuple[Regression, str, Floats | None]:
     """Return the regression, how it was done, and what the other way gives where both can be."""
+    rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
+    if not rows:
+        raise InputError("the mechanics: no log moves for long enough")
     strokes = [item.strokes for item in rows]
     design = [_chosen(item, names) for item in rows]
     data = [item.effort for item in rows]
@@ -292,6 +304,7 @@ def _separate(
     rows: Sequence[Rows], names: tuple[str, ...], method: str
 ) -> dict[str, dict[str, Estimate]]:
     """Return the numbers of each log alone, and of each direction where logs move one way."""
+    rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
     groups = {item.name: [item] for item in rows} if len(rows) > 1 else {}
     for sign, name in ((1, "forwards"), (-1, "backwards")):
         one_way = [item for item in rows if item.direction == sign]

@@ -125,7 +125,7 @@ def mechanics_of(
     own = {}
     for name in found.regression.names:
         item = found.estimate(name)
-        if item is not None and name in names:
+        if item is not None:
             own[axis.inertia if name == "inertia" else name] = axis.number(item, name)
     own |= _ratios(found, axis)
     missing = {
@@ -133,11 +133,17 @@ def mechanics_of(
         for name in found.regression.names
         if name not in names and (item := found.estimate(name)) is not None and item.value
     }
-    if "coulomb" not in found.regression.names:
-        missing["coulomb"] = "nothing reverses: only its sum with a constant load is determined"
+    if found.direction:
+        missing["load"] = "nothing reverses: only the sum of friction and load is determined"
     written: list[Estimate] = []
     if effort.known:
         written = _plant(found, names, actuator, effort)
+        carried = {"motor.inertia", "load.inertia", "load.mass"} & {item.path for item in written}
+        if "inertia" in names and not carried:
+            missing["inertia"] = (
+                "what turns beside the motor, as given, is more than all that turns: correct "
+                "load.inertia or load.mass, gear.inertia and screw.inertia"
+            )
     else:
         missing["scale"] = (
             f"the effort is a {effort.unit or 'number'} of unknown scale: numbers are in its unit; "
@@ -157,7 +163,7 @@ def mechanics_of(
 def _undetermined(missing: Mapping[str, str]) -> dict[str, str]:
     paths = {
         "inertia": "motor.inertia", "viscous": "friction.viscous", "coulomb": "friction.dynamic",
-        "offset": "load.constant",
+        "offset": "load.constant", "load": "load.constant",
     }  # fmt: skip
     return {paths[name]: why for name, why in missing.items() if name in paths}
 
@@ -215,7 +221,16 @@ def _plant(
     preloaded = "screw.preload" in known and value("screw.preload") > 0.0
     if not preloaded:  # the preload's friction cannot be told from the bearings'
         add("coulomb", "friction.dynamic", rubbing, 1.0, ("load.friction",) if rubbing else ())
-    add("offset", "load.constant", 0.0, ratio, ())
+    if found.direction and not preloaded:  # one sum: friction's share follows from the load's
+        sign, load_given = found.direction, value("load.constant") / ratio
+        item = found.estimate("offset")
+        if item is not None and "offset" in names:
+            rest_of_it = max(sign * (item.value - load_given) - rubbing, 0.0)
+            dry = Estimate(rest_of_it, item.std, item.degrees)
+            given = (*effort.given, "load.constant")
+            out.append(named(dry, "friction.dynamic", actuator, given=given))
+    else:
+        add("offset", "load.constant", 0.0, ratio, ())
     return out
 
 

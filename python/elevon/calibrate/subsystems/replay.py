@@ -68,6 +68,7 @@ def plant_experiment(
     """
     values: dict[str, str | float] = {
         "drive.kind": "off", "thermal.model": "off",
+        "inverter.supply_voltage": _FAR,  # the diodes of a bridge that is off never conduct
         "stop.upper": _FAR, "stop.lower": -_FAR,
         "low.step": min(actuator.parameters.value("low.step"), drive.period / _STEPS),
     }  # fmt: skip

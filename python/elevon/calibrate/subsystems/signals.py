@@ -228,7 +228,7 @@ def drive_signals(log: Log, actuator: Actuator, role: str) -> DriveSignals:
     ticking = bool(np.all(np.abs(np.diff(log.time) / period - 1.0) < JITTER))
     if ticking:
         period = log.duration / (len(log.time) - 1)
-        log = replace(log, time=period * np.arange(len(log.time)))
+        log = replace(log, time=period * np.arange(len(log.time), dtype=np.float64))
     time = np.arange(0.0, log.duration + 0.5 * period, period)
     needed = np.isfinite(log[motion]) & np.isfinite(log[role]) & log.good
     known = log.time[needed]
@@ -243,6 +243,7 @@ def drive_signals(log: Log, actuator: Actuator, role: str) -> DriveSignals:
 
     place = np.clip(np.searchsorted(known, time), 1, len(known) - 1)
     good = np.asarray(known[place] - known[place - 1] <= GAP * period)
+    good &= (time >= known[0]) & (time <= known[-1])
     position = at("motor_position")
     speed = at("motor_speed")
     effort = at(role)
@@ -252,7 +253,7 @@ def drive_signals(log: Log, actuator: Actuator, role: str) -> DriveSignals:
         log.name, time, period, good, effort,
         at("output_position", ratio) if position is None else position,
         at("output_speed", ratio) if speed is None else speed,
-        at("command", ratio) if log.units.get("command", "") in {"rad", "m"} else None,
+        at("command", ratio) if log.units.get("command", "") in {"", "rad", "m"} else None,
         at("speed_ref"), at(ref) if ref else None, at("load"),
     )  # fmt: skip
 

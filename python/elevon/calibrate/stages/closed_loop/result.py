@@ -90,8 +90,11 @@ def calibrate_loop(
     run_stages(LOOP_STAGES, context, 0.0, 1.0)
     fitted = context.fitted
     context.go(1.0)
+    determined = any(item.in_set for item in context.estimates)
     return Calibration(
-        actuator=_with(context.servo, fitted, context.chosen.structure, context.reasons),
+        actuator=_with(context.servo, fitted, context.chosen.structure, context.reasons)
+        if determined
+        else actuator,
         before=actuator,
         logs=log_facts(context.logs),
         parameters=by_path(context.estimates),
