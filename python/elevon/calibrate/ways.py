@@ -83,7 +83,7 @@ def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibrati
                 counted, actuator, scale=request.torque_constant, progress=request.progress
             )
         except InputError:
-            if way is None:
+            if way is None or request.torque_constant is not None:
                 raise
     if machine is None and request.torque_constant is not None:
         raise InputError(

@@ -240,8 +240,8 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     half = 0.5 * drives[0].period
     late = [_regression([mechanics_rows(d, band, s) for d in drives], names, method)[0].value
             for s in (-half, half)]  # fmt: skip
-    # Both shifts are one unknown: half their difference is its deviation's bound.
-    choices.append(regression.value + (late[1] - late[0]) / (2.0 * 3.0**0.5))
+    # An effort that is held between samples is late by half a period; one that is a mean is not.
+    choices.append(regression.value + 0.5 * (late[1] - late[0]))
     regression = regression.open_to(choices)
     separate = _separate(rows, names, method)
     regression, findings = _between(regression, separate)

@@ -70,6 +70,7 @@ def plant_experiment(
         "drive.kind": "off", "thermal.model": "off",
         "inverter.supply_voltage": _FAR,  # the diodes of a bridge that is off never conduct
         "stop.upper": _FAR, "stop.lower": -_FAR,
+        "control.speed_gain": 0.0, "control.pid_gain": 0.0,  # no loop acts: none limits the step
         "low.step": min(actuator.parameters.value("low.step"), drive.period / _STEPS),
     }  # fmt: skip
     known = actuator.parameters
