@@ -106,7 +106,7 @@ def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibrati
     parts = of_registers(result.estimates, result.undetermined)
     if machine is not None:
         parts |= {name: machine.subsystems[name] for name in ("electrics", "transmission")}
-        parts["mechanics"] = parts["mechanics"].beside(machine.subsystems["mechanics"])
+        parts["mechanics"] = parts["mechanics"].joined_with(machine.subsystems["mechanics"])
     return replace(result, facts={**result.facts, "subsystems": parts})
 
 
@@ -155,7 +155,7 @@ def validate_any(logs: Sequence[Log], request: ValidationRequest) -> Validation:
     from elevon.calibrate.subsystems.flow import identifiable, validate_machine
 
     way, error = _way(logs, request.actuator, validating=True)
-    known = "law" in (request.actuator.validation or {})
+    known = (request.actuator.validation or {}).get("law") is not None
     if (way is None or known) and identifiable(logs, request.actuator):
         return validate_machine(logs, request.actuator, progress=request.progress)
     if way is None:

@@ -64,8 +64,8 @@ def _scale(settings: list[str] | None) -> tuple[list[str], str | None]:
     given = [text for text in settings or () if text.replace(" ", "").startswith(head)]
     if len(given) > 1:
         raise InputError("--set motor.torque_constant is given twice")
-    rest = [text for text in settings or () if text not in given]
-    return rest, given[0].partition("=")[2].strip() if given else None
+    others = [text for text in settings or () if text not in given]
+    return others, given[0].partition("=")[2].strip() if given else None
 
 
 def _paths(free: list[str] | None) -> list[str] | None:

@@ -27,7 +27,7 @@ SIMPLER = 1.10  # of the least variance left: as good. ASSUMED
 FOLDS = 10  # alternating stretches, fitted and predicted in turn
 DELAYS = (0, 1, 2, 3)  # samples
 LAGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # samples: time constants of a filtered speed
-HELD = 3  # samples at one value: a limit
+SATURATED_SAMPLES = 3  # samples at one value: a limit
 LESS = 0.9  # of the variance left: a logged load that brings as much acts on the output. ASSUMED
 SEEN = 4.0  # deviations of its gain
 FINER = 10  # blocks of the covariance a stretch
@@ -204,11 +204,11 @@ def _direct(drives: Sequence[DriveSignals]) -> list[Controller]:
         each = [{"command": _late(d.effort_ref, delay)} for d in drives if d.effort_ref is not None]
         normal = _Normal.of(drives, each, limit)
         out.append((normal.held_out(("command",)), delay, normal))
-    held, delay, normal = max(out, key=lambda item: item[0])
+    share, delay, normal = max(out, key=lambda item: item[0])
     found = normal.regression(("command",))
     period = drives[0].period
     return [
-        Controller("direct", "effort", ("command",), found, SPEEDS[2], delay, period, limit, held)
+        Controller("direct", "effort", ("command",), found, SPEEDS[2], delay, period, limit, share)
     ]
 
 
@@ -231,9 +231,9 @@ def _law(
                 for each in columns
             ]
             normal = _Normal.of(drives, late, limit)
-            held = normal.held_out((*rich, *load))
-            if best is None or held > best[0]:
-                best = held, speed, delay, normal
+            share = normal.held_out((*rich, *load))
+            if best is None or share > best[0]:
+                best = share, speed, delay, normal
     assert best is not None
     _, speed, delay, normal = best
     if load and not _adds(normal, rich):
@@ -246,13 +246,13 @@ def _law(
             found.append((len(every), normal.held_out(every), label, name, (*terms, *forward)))
     least = min(1.0 - item[1] for item in found)
     good = [item for item in found if 1.0 - item[1] <= SIMPLER * least]
-    _, held, _, name, terms = min(good, key=lambda item: (item[0], -item[1]))
+    _, share, _, name, terms = min(good, key=lambda item: (item[0], -item[1]))
     regression = normal.regression((*terms, *load))
     tried: dict[str, float] = {}
     for _, share, label, *_ in found:
         tried[label] = max(share, tried.get(label, -np.inf))
     return Controller(
-        name, of, terms, regression, speed, delay, drives[0].period, limit, held,
+        name, of, terms, regression, speed, delay, drives[0].period, limit, share,
         regression.estimate("load") if load else None, tried,
     )  # fmt: skip
 
@@ -307,11 +307,14 @@ def _late(values: Floats, delay: int) -> Floats:
 
 
 def _limit(drives: Sequence[DriveSignals]) -> float | None:
-    """Return the effort that was held as the largest; None where none was."""
+    """Return the effort that was share as the largest; None where none was."""
     top = max(float(np.abs(d.effort).max()) for d in drives)
     for drive in drives:
         at = np.abs(drive.effort) >= (1.0 - _NEAR) * top
-        if at.sum() >= HELD and np.convolve(at, np.ones(HELD), mode="valid").max() >= HELD:
+        if (
+            at.sum() >= SATURATED_SAMPLES
+            and np.convolve(at, np.ones(SATURATED_SAMPLES), mode="valid").max() >= SATURATED_SAMPLES
+        ):
             return top
     return None
 
@@ -374,10 +377,10 @@ class _Normal:
         at, last, left = self._places(terms), len(self.names), 0.0
         for parity in (0, 1):
             fit = self.products[parity::2].sum(axis=0)
-            rest = self.products[1 - parity :: 2].sum(axis=0)
+            others = self.products[1 - parity :: 2].sum(axis=0)
             gains = np.linalg.lstsq(fit[np.ix_(at, at)], fit[at, last], rcond=1e-13)[0]
-            left += rest[last, last] - 2.0 * gains @ rest[at, last]
-            left += gains @ rest[np.ix_(at, at)] @ gains
+            left += others[last, last] - 2.0 * gains @ others[at, last]
+            left += gains @ others[np.ix_(at, at)] @ gains
         effort = self.table[:, last]
         spread = float(np.var(effort)) * len(effort) / self.size[last] ** 2
         return float(1.0 - max(left, 0.0) / spread) if spread > 0.0 else 0.0

@@ -10,7 +10,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.log import motor_ratio
-from elevon.calibrate.subsystems.signals import FEWEST, REST, low_pass
+from elevon.calibrate.subsystems.signals import FEWEST, REST_SPEED, low_pass
 from elevon.errors import InputError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
@@ -102,7 +102,7 @@ def identify_transmission(logs: Sequence[Log], actuator: Actuator) -> Determinat
             x[good] for x in (log["motor_position"], log["output_position"], log.time)
         )
         speed = np.gradient(low_pass(motor, 0.1 / log.period, 1.0 / log.period), log.period)
-        moving = np.abs(speed) > REST * float(np.abs(speed).max())
+        moving = np.abs(speed) > REST_SPEED * float(np.abs(speed).max())
         one = np.zeros((len(time), len(serving)))
         one[:, number] = 1.0
         table = np.column_stack([motor, -0.5 * np.sign(speed), np.cos(motor), np.sin(motor), one])

@@ -412,8 +412,8 @@ def _driven(
                 f"{drive.rate:.4g} Hz: the closed loop is not run"
             )  # fmt: skip
         if "load" not in law.gains and drive.load is not None:
-            own = replace(drive, effort=drive.effort / effort.scale)
-            gain = load_gain(own)
+            own_signals = replace(drive, effort=drive.effort / effort.scale)
+            gain = load_gain(own_signals)
             if gain is not None:
                 law = replace(law, gains={**law.gains, "load": gain})
                 ways.append(

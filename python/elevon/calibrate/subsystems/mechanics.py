@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.subsystems.signals import REST, DriveSignals, useful_band
+from elevon.calibrate.subsystems.signals import REST_SPEED, DriveSignals, useful_band
 from elevon.errors import InputError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed, with_deviations
@@ -141,21 +141,21 @@ def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> Rows
     effort = drive.effort
     if shift:
         effort = np.interp(drive.time + shift, drive.time, effort)
-    moving = (np.abs(speed) > REST * float(np.abs(speed).max())) & drive.good
+    moving = (np.abs(speed) > REST_SPEED * float(np.abs(speed).max())) & drive.good
     one = np.ones_like(speed)
     columns = np.column_stack([acceleration, speed, np.sign(speed), one])
-    asked = drive.noiseless(band)
+    noiseless = drive.noiseless(band)
     count = max(1, int(drive.rate / (THINNED * band)))
     both = [columns, effort[:, None], position[:, None], moving[:, None].astype(np.float64)]
-    if asked is not None:
-        both.append(np.column_stack([asked[1], asked[0], np.sign(asked[0]), one]))
+    if noiseless is not None:
+        both.append(np.column_stack([noiseless[1], noiseless[0], np.sign(noiseless[0]), one]))
     load = drive.load
     if load is not None:
         both.append(load[:, None])
     table = _thinned(np.hstack(both), count, drive.rate)
     keep = _inside(table, drive, count) & (table[:, 6] > MOVING)
     table, time = table[keep], drive.time[::count][keep]
-    instrument = table[:, 7:11] if asked is not None else None
+    instrument = table[:, 7:11] if noiseless is not None else None
     return Rows(
         drive.name, time, table[:, 1], table[:, 5], table[:, 4], table[:, :4], instrument,
         table[:, -1] if load is not None else None, drive.period * count,

@@ -50,7 +50,7 @@ class Subsystem(Plain):
     reason: str = ""
     more: Annotated[Mapping[str, Any], REMAINDER] = field(default_factory=dict)
 
-    def beside(self, other: Subsystem) -> Subsystem:
+    def joined_with(self, other: Subsystem) -> Subsystem:
         """Return it with what another way determines of the same subsystem under its own names."""
         more = {f"by_regression.{name}": item for name, item in other.parameters.items()}
         status = max(self.status, other.status, key=(NOT, PARTIAL, IDENTIFIED).index)
@@ -122,12 +122,12 @@ def mechanics_of(
     """Return the mechanics, what goes into the actuator file, and what is not determined."""
     axis = Axis.of(actuator, effort)
     names = [name for name in found.regression.names if found.determined(name)]
-    own = {}
+    axis_numbers = {}
     for name in found.regression.names:
         item = found.estimate(name)
         if item is not None:
-            own[axis.inertia if name == "inertia" else name] = axis.number(item, name)
-    own |= _ratios(found, axis)
+            axis_numbers[axis.inertia if name == "inertia" else name] = axis.number(item, name)
+    axis_numbers |= _ratios(found, axis)
     missing = {
         name: f"its deviation is {100 * abs(item.std / item.value):.0f} % of it"
         for name in found.regression.names
@@ -157,7 +157,7 @@ def mechanics_of(
         "separate": found.separate, "friction_curve": found.curve.tolist(),
     }  # fmt: skip
     reason = "; ".join(f"{name}: {why}" for name, why in missing.items())
-    return Subsystem(status, own, reason, more), written, _undetermined(missing)
+    return Subsystem(status, axis_numbers, reason, more), written, _undetermined(missing)
 
 
 def _undetermined(missing: Mapping[str, str]) -> dict[str, str]:
@@ -209,12 +209,18 @@ def _plant(
             out.append(named(shifted, path, actuator, given=(*effort.given, *given)))
 
     load = next((p for p in ("load.inertia", "load.mass") if p in others), None)
-    rest = sum(others.values())
+    other_inertia = sum(others.values())
     if load is not None and others[load] > value("motor.inertia"):
-        less = rest - others[load] + value("motor.inertia")
+        less = other_inertia - others[load] + value("motor.inertia")
         add("inertia", load, less, 1.0 / parts[load], ("motor.inertia",))
     else:
-        add("inertia", "motor.inertia", rest, 1.0, tuple(p for p, v in others.items() if v > 0.0))
+        add(
+            "inertia",
+            "motor.inertia",
+            other_inertia,
+            1.0,
+            tuple(p for p, v in others.items() if v > 0.0),
+        )
     damping = value("load.damping") / ratio**2 if "load.damping" in known else 0.0
     add("viscous", "friction.viscous", damping, 1.0, ("load.damping",) if damping else ())
     rubbing = value("load.friction") / abs(ratio) if "load.friction" in known else 0.0
@@ -249,11 +255,13 @@ def electrics_of(found: Determination, actuator: Actuator) -> tuple[Subsystem, l
     written = [named(good[n], p, actuator) for n, p in paths.items() if n in good]
     whole = len(written) == len(paths)
     status = IDENTIFIED if whole else PARTIAL if written else NOT
-    shown = {item.path: item for item in written}
+    reported = {item.path: item for item in written}
     if "drop" in good:
-        shown["drop"] = replace(good["drop"], path="derived.voltage_drop", unit="V", in_set=False)
+        reported["drop"] = replace(
+            good["drop"], path="derived.voltage_drop", unit="V", in_set=False
+        )
     reason = "" if whole else "current, its change and the speed do not vary apart enough"
-    return Subsystem(status, shown, reason, {"explained": found.explained}), written
+    return Subsystem(status, reported, reason, {"explained": found.explained}), written
 
 
 def transmission_of(found: Determination, actuator: Actuator) -> Subsystem:
@@ -262,13 +270,13 @@ def transmission_of(found: Determination, actuator: Actuator) -> Subsystem:
         return Subsystem(NOT, reason=found.reason)
     place = "m" if linear(actuator) else "rad"
     units = {"ratio": f"rad/{place}", "ratio_of_given": "1"}
-    shown = {
+    reported = {
         name: replace(item, path=f"derived.{name}", unit=units.get(name, place), in_set=False)
         for name, item in found.numbers.items()
     }
-    sure = found.numbers["ratio"]
-    status = IDENTIFIED if sure.std < 0.01 * abs(sure.value) else PARTIAL
-    return Subsystem(status, shown, "", {"explained": found.explained})
+    ratio = found.numbers["ratio"]
+    status = IDENTIFIED if ratio.std < 0.01 * abs(ratio.value) else PARTIAL
+    return Subsystem(status, reported, "", {"explained": found.explained})
 
 
 def controller_of(
@@ -297,23 +305,23 @@ def controller_of(
         "gain": "1" if found.of == "effort" else f"{unit}/{place}",
         "acceleration_feedforward": f"{unit} s2/{place}",
     }  # fmt: skip
-    shown = {}
+    reported = {}
     for name, item in found.gains().items():
         factor = ratio if units[name].endswith((f"/{place}", f"({place} s)")) else 1.0
-        shown[name] = replace(
+        reported[name] = replace(
             item.scaled(factor), path=f"derived.{name}", unit=units[name],
             register="controller", in_set=False,
         )  # fmt: skip
     if found.disturbance is not None:
         more["load_acts_on_the_output"] = True
-        shown["load_gain"] = replace(
+        reported["load_gain"] = replace(
             found.disturbance, path="derived.load_gain", unit=f"{unit} a unit of the load",
             register="controller", in_set=False,
         )  # fmt: skip
     if not (found.exact and effort.known and found.of == "position"):
-        return Subsystem(IDENTIFIED, shown, "", more), [], {}
+        return Subsystem(IDENTIFIED, reported, "", more), [], {}
     written, values = _written_gains(found, actuator, effort)
-    return Subsystem(IDENTIFIED, shown, "", more), written, values
+    return Subsystem(IDENTIFIED, reported, "", more), written, values
 
 
 def _written_gains(

@@ -29,7 +29,7 @@ _WHOLE = (
 )
 _FAR = 1e6  # output's coordinate: stops that no log reaches
 _STEPS = 4  # of the solver a sample, at least
-_SHOWN = {"motor_position": "motor_position", "motor_speed": "motor_speed"}
+_SIGNALS = {"motor_position": "motor_position", "motor_speed": "motor_speed"}
 WINDOW = 0.5  # s: a window of the open-loop prediction
 
 
@@ -78,14 +78,14 @@ def plant_experiment(
         {path: value for path, value in values.items() if path in known}, source="open loop"
     )
     position, speed, _ = _states(drive)
-    log = Log(drive.name, drive.time, dict.fromkeys(_SHOWN, drive.time))
+    log = Log(drive.name, drive.time, dict.fromkeys(_SIGNALS, drive.time))
     length = float(drive.time[-1]) if duration is None else duration
-    rest = (np.array([0.0, length]), np.zeros(2))
+    zero_input = (np.array([0.0, length]), np.zeros(2))
     inputs = Inputs(
-        length, "position", rest, loads={"shaft": (drive.time, -torque)},
+        length, "position", zero_input, loads={"shaft": (drive.time, -torque)},
         initial=_begin(float(position[0]), float(speed[0]), motor_ratio(actuator)),
     )  # fmt: skip
-    return Experiment(log, model, inputs, _SHOWN, rate="every")
+    return Experiment(log, model, inputs, _SIGNALS, rate="every")
 
 
 def _states(drive: DriveSignals) -> tuple[Floats, Floats, Floats]:
@@ -112,7 +112,7 @@ def free_run(drive: DriveSignals, actuator: Actuator, torque: Floats) -> tuple[F
         raise InputError(
             f"{drive.name}: the model driven by the measured effort does not stay finite"
         )
-    position, speed = (np.interp(drive.time, run.log.time, run.log[name]) for name in _SHOWN)
+    position, speed = (np.interp(drive.time, run.log.time, run.log[name]) for name in _SIGNALS)
     return position, speed
 
 
@@ -153,7 +153,7 @@ def window_runs(
     out = np.full((2, len(drive.time)), np.nan)
     for k, run in zip(starts, experiment.run(variants), strict=True):
         if run.complete:
-            for row, name in enumerate(_SHOWN):
+            for row, name in enumerate(_SIGNALS):
                 out[row, k : k + count] = np.interp(times[:-1], run.log.time, run.log[name])
     return out[0], out[1]
 
@@ -183,5 +183,5 @@ def closed_loop(
         return -scale * float(efforts[k])
 
     experiment = plant_experiment(drive, actuator, np.zeros(len(drive.time)))
-    out = experiment.stepped(set_torque, "shaft", tuple(_SHOWN), drive.time)
+    out = experiment.stepped(set_torque, "shaft", tuple(_SIGNALS), drive.time)
     return out[:, 0], efforts

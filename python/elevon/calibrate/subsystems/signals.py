@@ -32,7 +32,7 @@ NOISE_SHARE = 0.003
 LOWEST_BAND, HIGHEST_BAND = 0.02, 0.2  # of the sampling rate
 JITTER = 0.3  # of a period: stamps that differ by less are those of a regular clock. ASSUMED
 GAP = 3.0  # periods: a longer pause between two samples is a gap
-REST = 0.01  # of the largest speed: below it friction is whatever holds
+REST_SPEED = 0.01  # of the largest speed: below it friction is whatever holds
 
 
 @dataclass(frozen=True)
