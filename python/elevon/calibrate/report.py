@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from elevon.arrays import Floats
     from elevon.calibrate.outcome import Calibration
     from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 
@@ -68,6 +69,7 @@ def calibration_report(
         report.section("Not determined").table(ReportTable(["Parameter", "Reason"], rows))
     if result.findings:
         report.section("What to know").points(result.findings)
+    _subsystems(report, facts.get("subsystems", {}))
     _ranking(report, facts.get("identifiability"))
     _held_out(report, [item for item in facts.get("held_out", ()) if "speed_rms" in item])
     if result.validation is not None:
@@ -138,6 +140,74 @@ def _parameters(report: Report, result: Calibration, truth: Mapping[str, float])
     if figure is not None:
         section.figure(figure, "Estimates over the old values, with their intervals.")
     section.table(ReportTable.of(rows, "* not part of the actuator file"))
+
+
+def _subsystems(report: Report, parts: Mapping[str, Mapping[str, Any]]) -> None:
+    """What is determined of each subsystem, and the inverse model beside its data."""
+    if not parts:
+        return
+    section = report.section(
+        "Subsystems",
+        "Each from what was measured at its input and at its output; none waits for another.",
+    )
+    rows = [
+        [name, part["status"].replace("_", " "), part.get("reason", "")]
+        for name, part in parts.items()
+    ]
+    section.table(ReportTable(["Subsystem", "Status", "Why"], rows))
+    numbers: list[dict[str, object]] = [
+        {
+            "Subsystem": name,
+            "Number": key,
+            "Value": item["value"],
+            "Interval": f"{item['low']:.5g} to {item['high']:.5g}",
+            "Unit": item["unit"],
+        }
+        for name, part in parts.items()
+        for key, item in part.get("parameters", {}).items()
+    ]
+    if numbers:
+        section.table(ReportTable.of(numbers))
+    mechanics = parts.get("mechanics", {})
+    for log, table in mechanics.get("residual", {}).items():
+        section.figure(
+            _inverse_model(np.asarray(table)),
+            f"{log}: measured and predicted effort; what is left against speed and position.",
+        )
+    curve = np.asarray(mechanics.get("friction_curve", []))
+    if curve.size:
+        section.figure(
+            _friction(curve), "Friction: the effort less inertia and constant load, by speed."
+        )
+
+
+def _inverse_model(table: Floats) -> Figure:
+    """Draw columns time, position, speed, measured and predicted effort of a log."""
+    time, position, speed, measured, predicted = table.T
+    with new_figure(1, 3, width=9.5, height=2.8, squeeze=False) as (figure, axes):
+        left, middle, right = axes[0]
+        left.plot(time, measured, color=COLOURS["grey"], lw=2.0, label="measured")
+        left.plot(time, predicted, color=COLOURS["orange"], lw=0.9, label="predicted")
+        left.set(xlabel="Time [s]", ylabel="Effort")
+        left.legend(loc="upper right")
+        for axis, values, label in (
+            (middle, speed, "Speed of the motor [rad/s]"),
+            (right, position, "Position of the motor [rad]"),
+        ):
+            axis.plot(values, measured - predicted, ".", ms=2, color=COLOURS["blue"])
+            axis.set(xlabel=label, ylabel="Measured less predicted")
+    return figure
+
+
+def _friction(curve: Floats) -> Figure:
+    """Draw bins of speed: friction and its deviation."""
+    with new_figure(1, 1, width=6.0, height=2.8, squeeze=False) as (figure, axes):
+        axis = axes[0][0]
+        axis.errorbar(
+            curve[:, 0], curve[:, 1], yerr=curve[:, 2], fmt="o", ms=3, color=COLOURS["blue"]
+        )
+        axis.set(xlabel="Speed of the motor [rad/s]", ylabel="Friction")
+    return figure
 
 
 def _ranking(report: Report, ranking: Mapping[str, Any] | None) -> None:

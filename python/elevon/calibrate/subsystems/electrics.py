@@ -10,7 +10,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.log import motor_ratio
-from elevon.calibrate.subsystems.signals import FEWEST, REST_SPEED, low_pass
+from elevon.calibrate.subsystems.signals import FEWEST, REST_SPEED, DriveSignals, low_pass
 from elevon.errors import InputError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
@@ -19,6 +19,7 @@ from elevon.logs.log import Log, bridged
 VOLTAGE = ("resistance", "inductance", "emf", "drop")
 _BAND = 0.1  # of the sampling rate: of voltage and current. ASSUMED: below the ripple's fold
 _THIN = 4  # samples of one row
+CELL_EXPLAINED = 0.9  # of the load cell's variance: below it the effort does not pass the cell
 #: Share of a period by which voltage and current may be logged apart. ASSUMED
 _APART = 0.5
 
@@ -85,6 +86,42 @@ def _voltage_balance(logs: Sequence[Log], shift: float) -> Regression:
         data.append(table[:, 4])
         strokes.append((time, moves, log.period * _THIN))
     return regressed(VOLTAGE, rows, data, strokes, robust=False)
+
+
+def identify_torque_constant(drives: Sequence[DriveSignals], per_output: float) -> Determination:
+    """Return the torque for one unit of effort [N m], from a load cell at the output.
+
+    What inertia and friction take between motor and cell is regressed beside it.
+
+    Parameters
+    ----------
+    drives : sequence of DriveSignals
+        The logs; those without a load cell do not count.
+    per_output : float
+        Motor's angle over the output's coordinate.
+    """
+    rows, data, strokes = [], [], []
+    for drive in drives:
+        if drive.load_cell is None or not float(np.ptp(drive.effort)) > 0.0:
+            continue
+        band = _BAND * drive.rate
+        _, speed, acceleration = drive.derivatives(band)
+        columns = (drive.effort, acceleration, speed, np.sign(speed), np.ones(len(speed)))
+        table = np.column_stack(
+            [low_pass(c, band, drive.rate) for c in (*columns, drive.load_cell)]
+        )
+        table = table[drive.good][::_THIN]
+        rows.append(table[:, :5])
+        data.append(table[:, 5] / per_output)
+        strokes.append((drive.time[drive.good][::_THIN], speed[drive.good][::_THIN], drive.period))
+    if not rows:
+        return Determination({}, reason="no load cell was logged")
+    names = ("torque_constant", "inertia", "viscous", "coulomb", "offset")
+    found = regressed(names, rows, data, strokes)
+    item = found.estimate("torque_constant")
+    if not np.isfinite(item.std) or found.explained < CELL_EXPLAINED:
+        return Determination({}, found.explained, "the load cell does not follow the effort")
+    return Determination({"torque_constant": item}, found.explained)
 
 
 def identify_transmission(logs: Sequence[Log], actuator: Actuator) -> Determination:

@@ -23,7 +23,11 @@ from elevon.calibrate.subsystems.controller import (
     identify_controller,
     load_gain,
 )
-from elevon.calibrate.subsystems.electrics import identify_electrics, identify_transmission
+from elevon.calibrate.subsystems.electrics import (
+    identify_electrics,
+    identify_torque_constant,
+    identify_transmission,
+)
 from elevon.calibrate.subsystems.mechanics import Mechanics, identify_mechanics
 from elevon.calibrate.subsystems.record import (
     NAMES,
@@ -156,7 +160,9 @@ def _mechanics(ctx: MachineContext) -> None:
 
 def _electrics(ctx: MachineContext) -> None:
     """Resistance, inductance, voltage constant."""
-    part, written = electrics_of(identify_electrics(ctx.logs), ctx.actuator)
+    cell = identify_torque_constant(ctx.drives, motor_ratio(ctx.actuator))
+    found = identify_electrics(ctx.logs)
+    part, written = electrics_of(found, cell, ctx.actuator, ctx.effort.unit)
     ctx.subsystems["electrics"] = part
     if "motor.emf_constant" not in {*ctx.effort.given} and ctx.scale is None:
         ctx.estimates += written

@@ -36,6 +36,7 @@ SHARE = 0.5
 DISAGREE = 3.0  # deviations between two groups of logs that are said
 #: Terms beyond the four: what else the residual is tried for.
 EXTRAS = ("stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
+DRAWN = 500  # samples of a log on the page
 SEEN = 4.0  # deviations from which a further term is reported, ...
 WORTH = 0.01  # ... and the share of the residual's variance that it explains
 
@@ -100,8 +101,8 @@ class Mechanics:
         Further terms that the residual shows.
     curve : ndarray, shape (k, 4)
         Speed [rad/s], friction and its deviation, samples, by bins of speed.
-    residual : list of (str, ndarray, ndarray, ndarray, ndarray)
-        By log: time, speed, measured and predicted effort.
+    residual : mapping of str to ndarray, shape (k, 5)
+        By log: time, position, speed, measured and predicted effort; some of the samples.
     findings : tuple of str
         What to know.
     direction : int
@@ -116,7 +117,7 @@ class Mechanics:
     separate: dict[str, dict[str, Estimate]] = field(default_factory=dict)
     extras: dict[str, Estimate] = field(default_factory=dict)
     curve: Floats = field(default_factory=lambda: np.empty((0, 4)))
-    residual: list[tuple[str, Floats, Floats, Floats, Floats]] = field(default_factory=list)
+    residual: dict[str, Floats] = field(default_factory=dict)
     findings: tuple[str, ...] = ()
     direction: int = 0
     effort_rms: float = 0.0
@@ -404,13 +405,15 @@ def _predicted(item: Rows, regression: Regression) -> Floats:
     return np.asarray(_chosen(item, regression.names) @ regression.value)
 
 
-def _residuals(
-    rows: Sequence[Rows], regression: Regression
-) -> list[tuple[str, Floats, Floats, Floats, Floats]]:
-    return [
-        (item.name, item.time, item.speed, item.effort, _predicted(item, regression))
-        for item in rows
-    ]
+def _residuals(rows: Sequence[Rows], regression: Regression) -> dict[str, Floats]:
+    """Return what a page draws of each log, every so many samples."""
+    out = {}
+    for item in rows:
+        table = np.column_stack(
+            [item.time, item.position, item.speed, item.effort, _predicted(item, regression)]
+        )
+        out[item.name] = table[:: max(1, len(table) // DRAWN)]
+    return out
 
 
 def _friction_curve(rows: Sequence[Rows], regression: Regression, bins: int = 24) -> Floats:

@@ -155,6 +155,7 @@ def mechanics_of(
         "band_hz": found.band, "method": found.method, "explained": found.regression.explained,
         "confounded_and_seen": list(found.findings), "effort": effort.role,
         "separate": found.separate, "friction_curve": found.curve.tolist(),
+        "residual": {name: table.tolist() for name, table in found.residual.items()},
     }  # fmt: skip
     reason = "; ".join(f"{name}: {why}" for name, why in missing.items())
     return Subsystem(status, axis_numbers, reason, more), written, _undetermined(missing)
@@ -240,10 +241,19 @@ def _plant(
     return out
 
 
-def electrics_of(found: Determination, actuator: Actuator) -> tuple[Subsystem, list[Estimate]]:
-    """Return the electrics, and what goes into the actuator file."""
+def electrics_of(
+    found: Determination, cell: Determination, actuator: Actuator, unit: str
+) -> tuple[Subsystem, list[Estimate]]:
+    """Return the electrics, and what goes into the actuator file.
+
+    A torque constant that a load cell gives is reported: it scales what other logs show.
+    """
+    constants = {
+        name: replace(item, path="derived.torque_constant", unit=f"N m/{unit or '1'}", in_set=False)
+        for name, item in cell.numbers.items()
+    }
     if not found.numbers:
-        return Subsystem(NOT, reason=found.reason), []
+        return Subsystem(PARTIAL if constants else NOT, constants, found.reason), []
     paths = {
         "resistance": "motor.winding_resistance", "inductance": "motor.winding_inductance",
         "emf": "motor.emf_constant",
@@ -255,7 +265,7 @@ def electrics_of(found: Determination, actuator: Actuator) -> tuple[Subsystem, l
     written = [named(good[n], p, actuator) for n, p in paths.items() if n in good]
     whole = len(written) == len(paths)
     status = IDENTIFIED if whole else PARTIAL if written else NOT
-    reported = {item.path: item for item in written}
+    reported = constants | {item.path: item for item in written}
     if "drop" in good:
         reported["drop"] = replace(
             good["drop"], path="derived.voltage_drop", unit="V", in_set=False

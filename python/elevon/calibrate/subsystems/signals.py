@@ -80,6 +80,8 @@ class DriveSignals:
         As measured, rad/s.
     command, speed_ref, effort_ref, load : ndarray or None
         Commanded position [rad], speed [rad/s] and effort [its unit]; the load as logged.
+    load_cell : ndarray or None
+        As logged.
     model_speed : ndarray or None
         Of the model driven by the measured effort [rad/s], where that was run.
     """
@@ -95,6 +97,7 @@ class DriveSignals:
     speed_ref: Floats | None
     effort_ref: Floats | None
     load: Floats | None
+    load_cell: Floats | None = None
     model_speed: Floats | None = None
 
     @property
@@ -267,7 +270,7 @@ def drive_signals(log: Log, actuator: Actuator, role: str) -> DriveSignals:
         at("output_position", ratio) if position is None else position,
         at("output_speed", ratio) if speed is None else speed,
         at("command", ratio) if log.units.get("command", "") in {"", "rad", "m"} else None,
-        at("speed_ref"), at(ref) if ref else None, at("load"),
+        at("speed_ref"), at(ref) if ref else None, at("load"), at("load_cell"),
     )  # fmt: skip
 
 
