@@ -32,7 +32,7 @@ LESS = 0.9  # of the variance left: a logged load that brings as much acts on th
 SEEN = 4.0  # deviations of its gain
 FINER = 10  # blocks of the covariance a stretch
 _NEAR = 1e-3  # of the largest effort: at the limit
-_KEPT_OFF = 5  # samples beside a limit that do not count
+_LIMIT_MARGIN = 5  # samples beside a limit that do not count
 
 #: The structures by their terms: what a position controller or a speed controller may be.
 POSITION_LAWS: Mapping[str, tuple[str, ...]] = {
@@ -148,34 +148,34 @@ class Controller:
 
     def gains(self) -> dict[str, Estimate]:
         """Return the gains by name: of the cascade where it is one, motor's coordinate."""
-        found = self.regression
+        result = self.regression
         if self.of == "effort":
-            return {"gain": found.estimate("command")}
+            return {"gain": result.estimate("command")}
         out = {}
-        place = {name: k for k, name in enumerate(found.names)}
+        place = {name: k for k, name in enumerate(result.names)}
         if self.of == "position" and "speed" in self.terms:
-            out["position_gain"] = found.of(lambda b: b[place["error"]] / b[place["speed"]])
-            out["speed_gain"] = found.estimate("speed")
+            out["position_gain"] = result.of(lambda b: b[place["error"]] / b[place["speed"]])
+            out["speed_gain"] = result.estimate("speed")
             if "travel" in self.terms:
-                out["integral_time"] = found.of(lambda b: b[place["speed"]] / b[place["travel"]])
+                out["integral_time"] = result.of(lambda b: b[place["speed"]] / b[place["travel"]])
             elif "integral" in self.terms:
-                out["integral_gain"] = found.estimate("integral")
+                out["integral_gain"] = result.estimate("integral")
             if "speed_ahead" in self.terms:
-                out["speed_feedforward"] = found.of(
+                out["speed_feedforward"] = result.of(
                     lambda b: b[place["speed_ahead"]] / b[place["speed"]]
                 )
         else:
-            out["gain"] = found.estimate("error")
+            out["gain"] = result.estimate("error")
             if "integral" in self.terms:
-                out["integral_time"] = found.of(lambda b: b[place["error"]] / b[place["integral"]])
+                out["integral_time"] = result.of(lambda b: b[place["error"]] / b[place["integral"]])
             if "derivative" in self.terms:
-                out["derivative_time"] = found.of(
+                out["derivative_time"] = result.of(
                     lambda b: b[place["derivative"]] / b[place["error"]]
                 )
             if "speed_ahead" in self.terms:
-                out["speed_feedforward"] = found.estimate("speed_ahead")
+                out["speed_feedforward"] = result.estimate("speed_ahead")
         if "acceleration_ahead" in self.terms:
-            out["acceleration_feedforward"] = found.estimate("acceleration_ahead")
+            out["acceleration_feedforward"] = result.estimate("acceleration_ahead")
         return out
 
 
@@ -205,10 +205,10 @@ def _direct(drives: Sequence[DriveSignals]) -> list[Controller]:
         normal = _Normal.of(drives, each, limit)
         out.append((normal.held_out(("command",)), delay, normal))
     share, delay, normal = max(out, key=lambda item: item[0])
-    found = normal.regression(("command",))
+    result = normal.regression(("command",))
     period = drives[0].period
     return [
-        Controller("direct", "effort", ("command",), found, SPEEDS[2], delay, period, limit, share)
+        Controller("direct", "effort", ("command",), result, SPEEDS[2], delay, period, limit, share)
     ]
 
 
@@ -238,18 +238,18 @@ def _law(
     _, speed, delay, normal = best
     if load and not _adds(normal, rich):
         load = ()
-    found = []
+    result = []
     for forward in FORWARD if of == "position" else ((),):
         for name, terms in laws.items():
             every = (*terms, *forward, *load)
             label = name + (" + feed-forward" if forward else "")
-            found.append((len(every), normal.held_out(every), label, name, (*terms, *forward)))
-    least = min(1.0 - item[1] for item in found)
-    good = [item for item in found if 1.0 - item[1] <= SIMPLER * least]
+            result.append((len(every), normal.held_out(every), label, name, (*terms, *forward)))
+    least = min(1.0 - item[1] for item in result)
+    good = [item for item in result if 1.0 - item[1] <= SIMPLER * least]
     _, share, _, name, terms = min(good, key=lambda item: (item[0], -item[1]))
     regression = normal.regression((*terms, *load))
     tried: dict[str, float] = {}
-    for _, share, label, *_ in found:
+    for _, share, label, *_ in result:
         tried[label] = max(share, tried.get(label, -np.inf))
     return Controller(
         name, of, terms, regression, speed, delay, drives[0].period, limit, share,
@@ -264,10 +264,10 @@ def load_gain(drive: DriveSignals) -> float | None:
     """
     if drive.load is None or drive.command is None or drive.position is None:
         return None
-    found, _ = identify_controller([drive])
-    if found is None or found.disturbance is None or not found.exact:
+    result, _ = identify_controller([drive])
+    if result is None or result.disturbance is None or not result.exact:
         return None
-    return found.disturbance.value
+    return result.disturbance.value
 
 
 def _adds(normal: _Normal, terms: tuple[str, ...]) -> bool:
@@ -325,7 +325,7 @@ def _free(drive: DriveSignals, limit: float | None) -> Bools:
     good[: 2 * max(DELAYS)] = False
     if limit is not None:
         at = np.abs(drive.effort) >= (1.0 - _NEAR) * limit
-        good &= np.convolve(at, np.ones(2 * _KEPT_OFF + 1), mode="same") < 0.5
+        good &= np.convolve(at, np.ones(2 * _LIMIT_MARGIN + 1), mode="same") < 0.5
     return good
 
 
@@ -364,8 +364,8 @@ class _Normal:
         size = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
         scaled = table / size
         edges = np.flatnonzero(np.diff(block, prepend=-1))
-        pieces = np.split(scaled, edges[1:])
-        products = np.array([piece.T @ piece for piece in pieces])
+        stretches = np.split(scaled, edges[1:])
+        products = np.array([piece.T @ piece for piece in stretches])
         return cls((*terms, *constants), table, size, block, products)
 
     def _places(self, terms: tuple[str, ...]) -> list[int]:
@@ -442,7 +442,7 @@ class LawNumbers:
         )  # fmt: skip
 
 
-class Law:
+class SampledLaw:
     """A controller of position, sample by sample: what it reads, and the effort it asks for.
 
     Parameters

@@ -51,13 +51,13 @@ def identify_electrics(logs: Sequence[Log]) -> Determination:
     ]  # fmt: skip
     if not serving:
         return Determination({}, reason="no voltage was logged beside the torque current")
-    found = _voltage_balance(serving, 0.0)
-    if not np.isfinite(found.covariance).all():
+    result = _voltage_balance(serving, 0.0)
+    if not np.isfinite(result.covariance).all():
         return Determination({}, reason="voltage, current and speed do not vary apart")
     late = [_voltage_balance(serving, shift).value for shift in (-_APART, _APART)]
     gap = (late[1] - late[0]) / (2.0 * 3.0**0.5)
-    found = found.open_to([found.value + gap])
-    return Determination({name: found.estimate(name) for name in VOLTAGE}, found.explained)
+    result = result.open_to([result.value + gap])
+    return Determination({name: result.estimate(name) for name in VOLTAGE}, result.explained)
 
 
 def _speed_of(log: Log) -> Floats | None:
@@ -117,11 +117,11 @@ def identify_torque_constant(drives: Sequence[DriveSignals], per_output: float) 
     if not rows:
         return Determination({}, reason="no load cell was logged")
     names = ("torque_constant", "inertia", "viscous", "coulomb", "offset")
-    found = regressed(names, rows, data, strokes)
-    item = found.estimate("torque_constant")
-    if not np.isfinite(item.std) or found.explained < CELL_EXPLAINED:
-        return Determination({}, found.explained, "the load cell does not follow the effort")
-    return Determination({"torque_constant": item}, found.explained)
+    result = regressed(names, rows, data, strokes)
+    item = result.estimate("torque_constant")
+    if not np.isfinite(item.std) or result.explained < CELL_EXPLAINED:
+        return Determination({}, result.explained, "the load cell does not follow the effort")
+    return Determination({"torque_constant": item}, result.explained)
 
 
 def identify_transmission(logs: Sequence[Log], actuator: Actuator) -> Determination:
@@ -148,14 +148,14 @@ def identify_transmission(logs: Sequence[Log], actuator: Actuator) -> Determinat
         strokes.append((time[moving], speed[moving], log.period))
     names = ("slope", "lost", "cosine", "sine", *(f"zero_{k}" for k in range(len(serving))))
     try:
-        found = regressed(names, rows, data, strokes)
+        result = regressed(names, rows, data, strokes)
     except (InputError, np.linalg.LinAlgError):
         return Determination({}, reason="the positions do not move together")
-    slope = found["slope"]
-    if not np.isfinite(found.covariance).all() or not slope:
+    slope = result["slope"]
+    if not np.isfinite(result.covariance).all() or not slope:
         return Determination({}, reason="the positions do not move together")
-    ratio = found.estimate("slope").inverted()
-    turn = found.of(lambda b: float(np.hypot(b[2], b[3])))
-    numbers = {"ratio": ratio, "lost_motion": found.estimate("lost"), "error_a_turn": turn}
+    ratio = result.estimate("slope").inverted()
+    turn = result.of(lambda b: float(np.hypot(b[2], b[3])))
+    numbers = {"ratio": ratio, "lost_motion": result.estimate("lost"), "error_a_turn": turn}
     numbers["ratio_of_given"] = ratio.scaled(1.0 / motor_ratio(actuator))
-    return Determination(numbers, found.explained)
+    return Determination(numbers, result.explained)

@@ -32,7 +32,7 @@ from elevon.calibrate.subsystems.mechanics import Mechanics, identify_mechanics
 from elevon.calibrate.subsystems.record import (
     NAMES,
     NOT,
-    Axis,
+    ReportAxis,
     Subsystem,
     controller_of,
     electrics_of,
@@ -87,7 +87,7 @@ class MachineContext(Context):
         What goes into the actuator file.
     values : dict of str to value
         Choices that go with them.
-    found : Mechanics or None
+    inverse : Mechanics or None
         What the regression of the mechanics gave.
     commanded, controller : Controller or None
         The best law, and that law where it explains enough.
@@ -98,7 +98,7 @@ class MachineContext(Context):
     subsystems: dict[str, Subsystem] = field(default_factory=dict, init=False)
     estimates: list[Estimate] = field(default_factory=list, init=False)
     values: dict[str, str | float] = field(default_factory=dict, init=False)
-    found: Mechanics | None = field(default=None, init=False)
+    inverse: Mechanics | None = field(default=None, init=False)
     commanded: Controller | None = field(default=None, init=False)
     controller: Controller | None = field(default=None, init=False)
 
@@ -148,11 +148,11 @@ def _mechanics(ctx: MachineContext) -> None:
         return free_run(drive, bare(ctx.actuator, numbers), drive.effort)[1]
 
     try:
-        ctx.found = identify_mechanics(ctx.torques, own_motion)
+        ctx.inverse = identify_mechanics(ctx.torques, own_motion)
     except InputError as error:
         ctx.subsystems["mechanics"] = Subsystem(NOT, reason=str(error))
         return
-    part, written, missing = mechanics_of(ctx.found, ctx.actuator, ctx.effort)
+    part, written, missing = mechanics_of(ctx.inverse, ctx.actuator, ctx.effort)
     ctx.subsystems["mechanics"] = part
     ctx.estimates += written
     ctx.reasons |= missing
@@ -161,8 +161,8 @@ def _mechanics(ctx: MachineContext) -> None:
 def _electrics(ctx: MachineContext) -> None:
     """Resistance, inductance, voltage constant."""
     cell = identify_torque_constant(ctx.drives, motor_ratio(ctx.actuator))
-    found = identify_electrics(ctx.logs)
-    part, written = electrics_of(found, cell, ctx.actuator, ctx.effort.unit)
+    result = identify_electrics(ctx.logs)
+    part, written = electrics_of(result, cell, ctx.actuator, ctx.effort.unit)
     ctx.subsystems["electrics"] = part
     if "motor.emf_constant" not in {*ctx.effort.given} and ctx.scale is None:
         ctx.estimates += written
@@ -172,8 +172,8 @@ def _electrics(ctx: MachineContext) -> None:
 
 def _transmission(ctx: MachineContext) -> None:
     """Ratio, lost motion, error a turn."""
-    found = identify_transmission(ctx.logs, ctx.actuator)
-    ctx.subsystems["transmission"] = transmission_of(found, ctx.actuator)
+    result = identify_transmission(ctx.logs, ctx.actuator)
+    ctx.subsystems["transmission"] = transmission_of(result, ctx.actuator)
 
 
 def _thermal(ctx: MachineContext) -> None:
@@ -187,10 +187,10 @@ def _thermal(ctx: MachineContext) -> None:
 
 def _controller(ctx: MachineContext) -> None:
     """Structure and gains of the law, where one explains the effort."""
-    found, why = identify_controller(ctx.drives)
-    part, written, values = controller_of(found, why, ctx.actuator, ctx.effort)
-    ctx.commanded = found
-    ctx.controller = found if found is not None and found.identified else None
+    result, why = identify_controller(ctx.drives)
+    part, written, values = controller_of(result, why, ctx.actuator, ctx.effort)
+    ctx.commanded = result
+    ctx.controller = result if result is not None and result.identified else None
     ctx.subsystems["controller"] = part
     ctx.estimates += written
     ctx.values |= values
@@ -292,17 +292,17 @@ def _findings(context: MachineContext) -> tuple[str, ...]:
                 f"{100 * more['explained']:.4g} % of the effort on data held out"
             )
         texts.append(text + (f" ({part.reason})" if part.reason else ""))
-    if context.found is not None:
-        texts += list(context.found.findings)
+    if context.inverse is not None:
+        texts += list(context.inverse.findings)
     return tuple(texts)
 
 
 def law_table(context: MachineContext) -> dict[str, object] | None:
     """Return an exact law of position as an actuator file keeps it."""
-    found = context.controller
-    if found is None or not found.exact or found.of != "position" or not context.effort.known:
+    result = context.controller
+    if result is None or not result.exact or result.of != "position" or not context.effort.known:
         return None
-    law = LawNumbers.of(found)
+    law = LawNumbers.of(result)
     table: dict[str, object] = {
         "structure": law.structure, "effort": context.effort.role, "scale": context.effort.scale,
         "gains": dict(law.gains), "constant": law.constant, "speed": law.speed.kind,
@@ -363,7 +363,7 @@ def validate_subsystems(
     """Return the errors of motion driven by the measured effort, and of the loop under its law."""
     if law is None and context.controller is not None and context.controller.of == "position":
         law = LawNumbers.of(context.controller) if context.controller.exact else None
-    axis = Axis.of(actuator, context.effort)
+    axis = ReportAxis.of(actuator, context.effort)
     unit = f"{axis.place}/s"
     names = {
         "open_loop_position": axis.place, "open_loop_speed": unit, "free_speed": unit,

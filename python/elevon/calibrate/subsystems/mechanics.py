@@ -42,7 +42,7 @@ WORTH = 0.01  # ... and the share of the residual's variance that it explains
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class InverseRows:
     """The inverse model's rows of one log, thinned.
 
     Attributes
@@ -136,7 +136,7 @@ class Mechanics:
         return item.value > 0.0 and item.std < SHARE * item.value
 
 
-def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> Rows:
+def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> InverseRows:
     """Return the rows of a log within a band [Hz], the effort read `shift` seconds later."""
     position, speed, acceleration = drive.derivatives(band)
     effort = drive.effort
@@ -157,7 +157,7 @@ def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> Rows
     keep = _inside(table, drive, count) & (table[:, 6] > MOVING)
     table, time = table[keep], drive.time[::count][keep]
     instrument = table[:, 7:11] if noiseless is not None else None
-    return Rows(
+    return InverseRows(
         drive.name, time, table[:, 1], table[:, 5], table[:, 4], table[:, :4], instrument,
         table[:, -1] if load is not None else None, drive.period * count,
     )  # fmt: skip
@@ -202,16 +202,16 @@ def identify_mechanics(
     InputError
         Nothing moves enough.
     """
-    found = _identified(drives)
+    result = _identified(drives)
     if own_motion is None or any(drive.noiseless(1.0) is not None for drive in drives):
-        return found
+        return result
     for _ in range(ROUNDS):
-        numbers = {name: found.regression[name] for name in found.regression.names}
+        numbers = {name: result.regression[name] for name in result.regression.names}
         if not (numbers["inertia"] > 0.0 and numbers["viscous"] >= 0.0):
-            return found
+            return result
         driven = [replace(drive, model_speed=own_motion(drive, numbers)) for drive in drives]
-        found = _identified(driven)
-    return found
+        result = _identified(driven)
+    return result
 
 
 def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
@@ -255,19 +255,19 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     )  # fmt: skip
 
 
-def _reverses(rows: Sequence[Rows]) -> bool:
+def _reverses(rows: Sequence[InverseRows]) -> bool:
     directions = {item.direction for item in rows}
     return 0 in directions or len(directions) > 1
 
 
-def _chosen(item: Rows, names: tuple[str, ...], instrument: bool = False) -> Floats:
+def _chosen(item: InverseRows, names: tuple[str, ...], instrument: bool = False) -> Floats:
     table = item.instrument if instrument else item.columns
     assert table is not None
     return table[:, [NAMES.index(name) for name in names]]
 
 
 def _regression(
-    rows: Sequence[Rows], names: tuple[str, ...], method: str | None = None
+    rows: Sequence[InverseRows], names: tuple[str, ...], method: str | None = None
 ) -> tuple[Regression, str, Floats | None]:
     """Return the regression, how it was done, and what the other way gives where both can be."""
     rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
@@ -302,7 +302,7 @@ def _regression(
 
 
 def _separate(
-    rows: Sequence[Rows], names: tuple[str, ...], method: str
+    rows: Sequence[InverseRows], names: tuple[str, ...], method: str
 ) -> dict[str, dict[str, Estimate]]:
     """Return the numbers of each log alone, and of each direction where logs move one way."""
     rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
@@ -314,9 +314,9 @@ def _separate(
     out = {}
     for name, items in groups.items():
         known = names if _reverses(items) else tuple(n for n in names if n != "coulomb")
-        found = _regression(items, known, method)[0]
-        if np.isfinite(found.covariance).all():
-            out[name] = {part: found.estimate(part) for part in known}
+        result = _regression(items, known, method)[0]
+        if np.isfinite(result.covariance).all():
+            out[name] = {part: result.estimate(part) for part in known}
     return out
 
 
@@ -345,9 +345,11 @@ def _between(
     return replace(regression, covariance=covariance), findings
 
 
-def _extras(rows: Sequence[Rows], regression: Regression) -> tuple[dict[str, Estimate], list[str]]:
+def _extras(
+    rows: Sequence[InverseRows], regression: Regression
+) -> tuple[dict[str, Estimate], list[str]]:
     """Return further terms that the residual shows, one at a time, and their words."""
-    names, found, texts = regression.names, {}, []
+    names, result, texts = regression.names, {}, []
     top = max(float(np.abs(item.speed).max()) for item in rows)
     for name in EXTRAS:
         columns = [c for item in rows if (c := _extra(name, item, top)) is not None]
@@ -364,13 +366,13 @@ def _extras(rows: Sequence[Rows], regression: Regression) -> tuple[dict[str, Est
         item = tried.estimate(name)
         less = 1.0 - (1.0 - tried.explained) / max(1.0 - regression.explained, 1e-300)
         if abs(item.value) > SEEN * item.std and less > WORTH:
-            found[name] = item
+            result[name] = item
             size = f"{item.value:.4g} +- {item.std:.2g}"
             texts.append(f"{name}: {size} explains {100 * less:.0f} % of what is left")
-    return found, texts
+    return result, texts
 
 
-def _extra(name: str, rows: Rows, top: float) -> Floats | None:
+def _extra(name: str, rows: InverseRows, top: float) -> Floats | None:
     """Return the column of a further term."""
     if name == "stribeck":
         return np.asarray(np.sign(rows.speed) * np.exp(-((rows.speed / (0.05 * top)) ** 2)))
@@ -401,11 +403,11 @@ def _confounded(names: tuple[str, ...]) -> str:
     )
 
 
-def _predicted(item: Rows, regression: Regression) -> Floats:
+def _predicted(item: InverseRows, regression: Regression) -> Floats:
     return np.asarray(_chosen(item, regression.names) @ regression.value)
 
 
-def _residuals(rows: Sequence[Rows], regression: Regression) -> dict[str, Floats]:
+def _residuals(rows: Sequence[InverseRows], regression: Regression) -> dict[str, Floats]:
     """Return what a page draws of each log, every so many samples."""
     out = {}
     for item in rows:
@@ -416,7 +418,7 @@ def _residuals(rows: Sequence[Rows], regression: Regression) -> dict[str, Floats
     return out
 
 
-def _friction_curve(rows: Sequence[Rows], regression: Regression, bins: int = 24) -> Floats:
+def _friction_curve(rows: Sequence[InverseRows], regression: Regression, bins: int = 24) -> Floats:
     """Return the effort less what inertia and constant load take, by bins of speed."""
     speed = np.concatenate([item.speed for item in rows])
     inertia = regression.names.index("inertia")

@@ -74,7 +74,7 @@ def _home(path: str) -> str:
 
 
 @dataclass(frozen=True)
-class Axis:
+class ReportAxis:
     """The coordinate of what is reported: a linear axis's output, else the motor's shaft.
 
     Attributes
@@ -93,7 +93,7 @@ class Axis:
     inertia: str
 
     @classmethod
-    def of(cls, actuator: Actuator, effort: Effort) -> Axis:
+    def of(cls, actuator: Actuator, effort: Effort) -> ReportAxis:
         """Return the axis of an actuator; in the effort's unit where its scale is not known."""
         moves = linear(actuator)
         torque = ("N" if moves else "N m") if effort.known else effort.unit
@@ -117,27 +117,27 @@ class Axis:
 
 
 def mechanics_of(
-    found: Mechanics, actuator: Actuator, effort: Effort
+    result: Mechanics, actuator: Actuator, effort: Effort
 ) -> tuple[Subsystem, list[Estimate], dict[str, str]]:
     """Return the mechanics, what goes into the actuator file, and what is not determined."""
-    axis = Axis.of(actuator, effort)
-    names = [name for name in found.regression.names if found.determined(name)]
+    axis = ReportAxis.of(actuator, effort)
+    names = [name for name in result.regression.names if result.determined(name)]
     axis_numbers = {}
-    for name in found.regression.names:
-        item = found.estimate(name)
+    for name in result.regression.names:
+        item = result.estimate(name)
         if item is not None:
             axis_numbers[axis.inertia if name == "inertia" else name] = axis.number(item, name)
-    axis_numbers |= _ratios(found, axis)
+    axis_numbers |= _ratios(result, axis)
     missing = {
         name: f"its deviation is {100 * abs(item.std / item.value):.0f} % of it"
-        for name in found.regression.names
-        if name not in names and (item := found.estimate(name)) is not None and item.value
+        for name in result.regression.names
+        if name not in names and (item := result.estimate(name)) is not None and item.value
     }
-    if found.direction:
+    if result.direction:
         missing["load"] = "nothing reverses: only the sum of friction and load is determined"
     written: list[Estimate] = []
     if effort.known:
-        written = _plant(found, names, actuator, effort)
+        written = _plant(result, names, actuator, effort)
         carried = {"motor.inertia", "load.inertia", "load.mass"} & {item.path for item in written}
         if "inertia" in names and not carried:
             missing["inertia"] = (
@@ -152,10 +152,10 @@ def mechanics_of(
     whole = not missing and "inertia" in names
     status = IDENTIFIED if whole else PARTIAL if names else NOT
     more = {
-        "band_hz": found.band, "method": found.method, "explained": found.regression.explained,
-        "confounded_and_seen": list(found.findings), "effort": effort.role,
-        "separate": found.separate, "friction_curve": found.curve.tolist(),
-        "residual": {name: table.tolist() for name, table in found.residual.items()},
+        "band_hz": result.band, "method": result.method, "explained": result.regression.explained,
+        "confounded_and_seen": list(result.findings), "effort": effort.role,
+        "separate": result.separate, "friction_curve": result.curve.tolist(),
+        "residual": {name: table.tolist() for name, table in result.residual.items()},
     }  # fmt: skip
     reason = "; ".join(f"{name}: {why}" for name, why in missing.items())
     return Subsystem(status, axis_numbers, reason, more), written, _undetermined(missing)
@@ -169,13 +169,13 @@ def _undetermined(missing: Mapping[str, str]) -> dict[str, str]:
     return {paths[name]: why for name, why in missing.items() if name in paths}
 
 
-def _ratios(found: Mechanics, axis: Axis) -> dict[str, Estimate]:
+def _ratios(result: Mechanics, axis: ReportAxis) -> dict[str, Estimate]:
     """Return what is known whatever the scale of the effort: numbers over the inertia."""
-    out, names = {}, found.regression.names
+    out, names = {}, result.regression.names
     units = {"viscous": "1/s", "coulomb": f"{axis.place}/s2", "offset": f"{axis.place}/s2"}
     for name in names[1:]:
         at = names.index(name)
-        item = _over_inertia(found, at)
+        item = _over_inertia(result, at)
         factor = 1.0 if name == "viscous" else 1.0 / axis.ratio
         path = f"derived.{name}_per_{axis.inertia}"
         if item.std < SHARE * abs(item.value):
@@ -185,12 +185,12 @@ def _ratios(found: Mechanics, axis: Axis) -> dict[str, Estimate]:
     return out
 
 
-def _over_inertia(found: Mechanics, at: int) -> Estimate:
-    return found.regression.of(lambda b: float(b[at] / b[0]))
+def _over_inertia(result: Mechanics, at: int) -> Estimate:
+    return result.regression.of(lambda b: float(b[at] / b[0]))
 
 
 def _plant(
-    found: Mechanics, names: Sequence[str], actuator: Actuator, effort: Effort
+    result: Mechanics, names: Sequence[str], actuator: Actuator, effort: Effort
 ) -> list[Estimate]:
     """Return the numbers as parameters; what else turns and rubs as given is taken off."""
     known, value, ratio = actuator.parameters, actuator.parameters.value, motor_ratio(actuator)
@@ -202,7 +202,7 @@ def _plant(
     out = []
 
     def add(name: str, path: str, less: float, factor: float, given: tuple[str, ...]) -> None:
-        item = found.estimate(name)
+        item = result.estimate(name)
         if item is None or name not in names or path not in records(actuator.wiring):
             return
         shifted = Estimate((item.value - less) * factor, item.std * abs(factor), item.degrees)
@@ -228,9 +228,9 @@ def _plant(
     preloaded = "screw.preload" in known and value("screw.preload") > 0.0
     if not preloaded:  # the preload's friction cannot be told from the bearings'
         add("coulomb", "friction.dynamic", rubbing, 1.0, ("load.friction",) if rubbing else ())
-    if found.direction and not preloaded:  # one sum: friction's share follows from the load's
-        sign, load_given = found.direction, value("load.constant") / ratio
-        item = found.estimate("offset")
+    if result.direction and not preloaded:  # one sum: friction's share follows from the load's
+        sign, load_given = result.direction, value("load.constant") / ratio
+        item = result.estimate("offset")
         if item is not None and "offset" in names:
             rest_of_it = max(sign * (item.value - load_given) - rubbing, 0.0)
             dry = Estimate(rest_of_it, item.std, item.degrees)
@@ -242,7 +242,7 @@ def _plant(
 
 
 def electrics_of(
-    found: Determination, cell: Determination, actuator: Actuator, unit: str
+    result: Determination, cell: Determination, actuator: Actuator, unit: str
 ) -> tuple[Subsystem, list[Estimate]]:
     """Return the electrics, and what goes into the actuator file.
 
@@ -252,14 +252,14 @@ def electrics_of(
         name: replace(item, path="derived.torque_constant", unit=f"N m/{unit or '1'}", in_set=False)
         for name, item in cell.numbers.items()
     }
-    if not found.numbers:
-        return Subsystem(PARTIAL if constants else NOT, constants, found.reason), []
+    if not result.numbers:
+        return Subsystem(PARTIAL if constants else NOT, constants, result.reason), []
     paths = {
         "resistance": "motor.winding_resistance", "inductance": "motor.winding_inductance",
         "emf": "motor.emf_constant",
     }  # fmt: skip
     good = {
-        name: item for name, item in found.numbers.items()
+        name: item for name, item in result.numbers.items()
         if item.value > 0.0 and item.std < SHARE * item.value
     }  # fmt: skip
     written = [named(good[n], p, actuator) for n, p in paths.items() if n in good]
@@ -271,39 +271,39 @@ def electrics_of(
             good["drop"], path="derived.voltage_drop", unit="V", in_set=False
         )
     reason = "" if whole else "current, its change and the speed do not vary apart enough"
-    return Subsystem(status, reported, reason, {"explained": found.explained}), written
+    return Subsystem(status, reported, reason, {"explained": result.explained}), written
 
 
-def transmission_of(found: Determination, actuator: Actuator) -> Subsystem:
+def transmission_of(result: Determination, actuator: Actuator) -> Subsystem:
     """Return the transmission: reported, not written, for the ratio is exact by its teeth."""
-    if not found.numbers:
-        return Subsystem(NOT, reason=found.reason)
+    if not result.numbers:
+        return Subsystem(NOT, reason=result.reason)
     place = "m" if linear(actuator) else "rad"
     units = {"ratio": f"rad/{place}", "ratio_of_given": "1"}
     reported = {
         name: replace(item, path=f"derived.{name}", unit=units.get(name, place), in_set=False)
-        for name, item in found.numbers.items()
+        for name, item in result.numbers.items()
     }
-    ratio = found.numbers["ratio"]
+    ratio = result.numbers["ratio"]
     status = IDENTIFIED if ratio.std < 0.01 * abs(ratio.value) else PARTIAL
-    return Subsystem(status, reported, "", {"explained": found.explained})
+    return Subsystem(status, reported, "", {"explained": result.explained})
 
 
 def controller_of(
-    found: Controller | None, why: str, actuator: Actuator, effort: Effort
+    result: Controller | None, why: str, actuator: Actuator, effort: Effort
 ) -> tuple[Subsystem, list[Estimate], dict[str, str | float]]:
     """Return the controller, what goes into the actuator file, and its structure."""
-    if found is None:
+    if result is None:
         return Subsystem(NOT, reason=why), [], {}
     more: dict[str, Any] = {
-        "structure": found.structure, "of": found.of, "explained": found.held_out,
-        "speed": found.speed.text, "delay_samples": found.delay, "sample_time_s": found.period,
-        "limit": found.limit, "tried": dict(found.tried), "exact": found.exact,
+        "structure": result.structure, "of": result.of, "explained": result.held_out,
+        "speed": result.speed.text, "delay_samples": result.delay, "sample_time_s": result.period,
+        "limit": result.limit, "tried": dict(result.tried), "exact": result.exact,
     }  # fmt: skip
-    if not found.identified:
+    if not result.identified:
         text = (
             f"no structure explains {100 * 0.9:.0f} % of the effort on data held out (the best, "
-            f"{found.structure}, {100 * max(found.held_out, 0.0):.0f} %)"
+            f"{result.structure}, {100 * max(result.held_out, 0.0):.0f} %)"
         )
         return Subsystem(NOT, reason=text, more=more), [], {}
     ratio = motor_ratio(actuator) if linear(actuator) else 1.0
@@ -312,34 +312,34 @@ def controller_of(
     units = {
         "position_gain": "1/s", "speed_gain": f"{unit} s/{place}", "integral_time": "s",
         "derivative_time": "s", "speed_feedforward": "1", "integral_gain": f"{unit}/({place} s)",
-        "gain": "1" if found.of == "effort" else f"{unit}/{place}",
+        "gain": "1" if result.of == "effort" else f"{unit}/{place}",
         "acceleration_feedforward": f"{unit} s2/{place}",
     }  # fmt: skip
     reported = {}
-    for name, item in found.gains().items():
+    for name, item in result.gains().items():
         factor = ratio if units[name].endswith((f"/{place}", f"({place} s)")) else 1.0
         reported[name] = replace(
             item.scaled(factor), path=f"derived.{name}", unit=units[name],
             register="controller", in_set=False,
         )  # fmt: skip
-    if found.disturbance is not None:
+    if result.disturbance is not None:
         more["load_acts_on_the_output"] = True
         reported["load_gain"] = replace(
-            found.disturbance, path="derived.load_gain", unit=f"{unit} a unit of the load",
+            result.disturbance, path="derived.load_gain", unit=f"{unit} a unit of the load",
             register="controller", in_set=False,
         )  # fmt: skip
-    if not (found.exact and effort.known and found.of == "position"):
+    if not (result.exact and effort.known and result.of == "position"):
         return Subsystem(IDENTIFIED, reported, "", more), [], {}
-    written, values = _written_gains(found, actuator, effort)
+    written, values = _written_gains(result, actuator, effort)
     return Subsystem(IDENTIFIED, reported, "", more), written, values
 
 
 def _written_gains(
-    found: Controller, actuator: Actuator, effort: Effort
+    result: Controller, actuator: Actuator, effort: Effort
 ) -> tuple[list[Estimate], dict[str, str | float]]:
     """Return gains as the model's parameters, and the choices that go with them."""
-    gains, per_output, scale = found.gains(), motor_ratio(actuator), effort.scale
-    if "speed" in found.terms and found.structure in {"P-P", "P-PI"}:
+    gains, per_output, scale = result.gains(), motor_ratio(actuator), effort.scale
+    if "speed" in result.terms and result.structure in {"P-P", "P-PI"}:
         paths = {
             "control.position_gain": ("position_gain", per_output),
             "control.speed_gain": ("speed_gain", scale),
@@ -351,7 +351,7 @@ def _written_gains(
             path: 0.0 for path, (name, _) in paths.items()
             if name not in gains and path in actuator.parameters
         }  # fmt: skip
-    elif found.structure in {"P", "PI", "PD", "PID"} and not found.terms[-1].endswith("ahead"):
+    elif result.structure in {"P", "PI", "PD", "PID"} and not result.terms[-1].endswith("ahead"):
         paths = {
             "control.pid_gain": ("gain", scale * per_output),
             "control.pid_integral_time": ("integral_time", 1.0),
@@ -360,7 +360,7 @@ def _written_gains(
         values = {"control.structure": "pid"}
     else:
         return [], {}
-    values["control.sample_time"] = found.period
+    values["control.sample_time"] = result.period
     known = records(actuator.wiring)
     written = [
         named(gains[name].scaled(factor), path, actuator, given=effort.given)

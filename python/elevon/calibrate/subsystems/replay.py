@@ -9,7 +9,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.stages.log import motor_ratio
-from elevon.calibrate.subsystems.controller import Law, LawNumbers
+from elevon.calibrate.subsystems.controller import LawNumbers, SampledLaw
 from elevon.calibrate.subsystems.signals import DriveSignals, useful_band
 from elevon.errors import InputError
 from elevon.experiment import Experiment, Inputs, Variant
@@ -175,7 +175,7 @@ def closed_loop(
         Torque of one unit of effort [N m].
     """
     assert drive.command is not None
-    controller = Law(law, drive.command, drive.load)
+    controller = SampledLaw(law, drive.command, drive.load)
     efforts = np.empty(len(drive.time))
 
     def set_torque(k: int, seen: Floats) -> float:
