@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from elevon.cli.registry import COMMANDS
+from elevon.cli.registry import commands as entries
 from elevon.cli.runner import app
 
 pexpect = pytest.importorskip("pexpect")
@@ -101,7 +101,7 @@ def _wait_for(shell, wanted):
 
 def test_a_command_does_not_offer_to_install():
     group = typer.main.get_command(app)
-    for name in COMMANDS:
+    for name in entries():
         names = {item.name for item in group.get_command(None, name).params}
         assert not names & {"install_completion", "show_completion"}
 

@@ -2,17 +2,17 @@
 
 import re
 import shlex
-from importlib import import_module
-from inspect import signature
+from importlib.metadata import EntryPoint
+from inspect import getdoc, signature
 
 import pytest
 import typer
 
-from elevon.cli import main
+from elevon.cli import main, registry
 from elevon.cli.help import example_of, help_rows
+from elevon.cli.options import own_parameters, parameter_texts
 from elevon.cli.output import progress_bar
-from elevon.cli.registry import COMMANDS
-from elevon.data import packaged_toml
+from elevon.cli.registry import commands as entries
 from tests.harness.registry import commands
 
 FOUND = {name: command for name, command in commands() if not name.startswith("studies")}
@@ -62,7 +62,7 @@ def test_commands_are_grouped_by_purpose(capsys):
     assert main(["--help"]) == 0
     text = capsys.readouterr().out
     places = [text.index(f"\n{group}:\n") for group in dict.fromkeys(
-        entry.group for entry in COMMANDS.values())]  # fmt: skip
+        entry.group for entry in entries().values())]  # fmt: skip
     assert places == sorted(places)
     assert len(places) > 4
 
@@ -88,17 +88,34 @@ def test_progress_ends_at_the_whole_and_not_where_work_stopped(capsys):
     assert capsys.readouterr().err.splitlines() == ["work: 40 %"]
 
 
-def test_each_text_of_an_option_belongs_to_a_parameter():
-    homes = {"all_cases": "elevon.cli.reproduce.all_cases"}
-    texts = packaged_toml("elevon.cli", "options.toml")
-    for name in texts.keys() - {"arguments", "options", "case"}:
-        module = import_module(homes.get(name, f"elevon.cli.{name}"))
-        functions = [
-            f for f in vars(module).values() if getattr(f, "__module__", "") == module.__name__
-        ]
-        taken = {function.__name__: {*signature(function).parameters} for function in functions}
-        for entry, words in texts[name].items():
-            if "help" in words:
-                assert any(entry in parameters for parameters in taken.values()), (name, entry)
-            else:
-                assert words.keys() <= taken[entry], (name, entry)
+def test_a_command_of_a_door_has_its_arguments_types_defaults_and_texts():
+    """Nothing of a door is written down twice: the signature is where an option comes from."""
+    from elevon.calibrate.door import validate
+
+    options = {item.name: item for item in FOUND["validate"].params}
+    parameters = signature(validate).parameters
+    assert parameters.keys() - {"progress"} <= options.keys()
+    assert options["fidelity"].default == parameters["fidelity"].default
+    texts = parameter_texts(getdoc(validate))
+    assert options["transient"].help == texts["transient"]
+    assert "[s]" in texts["transient"]
+
+
+def test_a_parameter_that_nothing_describes_is_refused():
+    def silent(*, unheard_of: int = 1) -> None:
+        """Do nothing."""
+
+    with pytest.raises(LookupError, match="unheard_of"):
+        own_parameters(silent)
+
+
+def test_another_package_adds_its_command_by_an_entry_point(monkeypatch, capsys):
+    point = EntryPoint("added", "elevon.cli.lives:predict", registry.ENTRY_POINTS)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
+    registry.commands.cache_clear()
+    try:
+        assert main(["added", "--help"]) == 0
+        assert "HISTORY" in capsys.readouterr().out
+        assert "Added by elevon." in registry.commands()["added"].help
+    finally:
+        registry.commands.cache_clear()

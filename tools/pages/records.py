@@ -12,7 +12,7 @@ import elevon
 from elevon import _core, errors
 from elevon.actuator import Actuator, list_actuators
 from elevon.cli.help import example_of, help_rows
-from elevon.cli.registry import COMMANDS
+from elevon.cli.registry import commands as entries
 from elevon.extras import APART, EXTRAS
 from elevon.prognose import LAWS
 
@@ -71,7 +71,7 @@ def span(record: dict) -> str:
 
 def commands() -> Iterator[tuple[str, str]]:
     """Yield a page for each command."""
-    for name, entry in COMMANDS.items():
+    for name, entry in entries().items():
         command = typer.main.get_command(importlib.import_module(entry.module).app)
         yield f"reference/commands/{name}.md", f"# elevon {name}\n\n" + _command(command, name)
 

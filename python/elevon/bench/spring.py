@@ -9,9 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from elevon.data import packaged_toml
 from elevon.errors import InputError, RangeError
+from elevon.option import Quantity
+from elevon.units import parse_quantity
 
 #: Preferred wire diameters [m].
 STANDARD_WIRES: tuple[float, ...] = tuple(
@@ -157,6 +160,26 @@ class SpringDesign:
         """Rotation of the guide that extends the springs fully [rad]."""
         return self.task.extension / (0.5 * self.task.guide_diameter)
 
+    def to_dict(self) -> dict[str, float | int | bool]:
+        """Return what ``--json`` prints of it, in the units that the keys name."""
+        return {
+            "wire_mm": 1e3 * self.wire,
+            "coil_mm": 1e3 * self.coil,
+            "largest_coil_mm": 1e3 * self.task.largest_coil(self.wire),
+            "coils": self.coils,
+            "free_length_mm": 1e3 * self.free_length,
+            "stiffness_N_per_mm": 1e-3 * self.stiffness,
+            "stress_N_per_mm2": 1e-6 * self.stress,
+            "curved_stress_N_per_mm2": 1e-6 * self.curved_stress,
+            "allowed_stress_N_per_mm2": 1e-6 * self.task.allowed_stress,
+            "safety": self.safety,
+            "cable_force_N": self.task.cable_force,
+            "torsional_stiffness_Nm_per_rad": self.torsional_stiffness,
+            "rotation_rad": self.rotation,
+            "wire_volume_cm3": 1e6 * self.wire_volume,
+            "feasible": self.feasible,
+        }
+
     def radial_force(self, mover: float) -> float:
         """Radial force on the gearbox [N] when the mover goes out by `mover` [m]: K dx."""
         return self.stiffness * mover
@@ -211,3 +234,114 @@ def search_springs(task: SpringTask | None = None, *, longest: float = 1.1) -> l
             if design.feasible and design.free_length <= longest:
                 designs.append(design)
     return sorted(designs, key=lambda design: design.wire_volume)
+
+
+@dataclass(frozen=True, slots=True)
+class SpringSizing:
+    """A chosen spring judged, and the other designs that hold.
+
+    Attributes
+    ----------
+    design : SpringDesign
+        The chosen one.
+    others : list of SpringDesign
+        Feasible designs over standard wires, least wire first.
+    mover : float
+        Displacement of the mover [m] of which the radial force is stated.
+    """
+
+    design: SpringDesign
+    others: list[SpringDesign]
+    mover: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the chosen spring holds."""
+        return self.design.feasible
+
+    @property
+    def radial_force(self) -> float:
+        """Radial force on the gearbox [N] at the mover's displacement."""
+        return self.design.radial_force(self.mover)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return status, checks, the chosen design and the others."""
+        design, task = self.design, self.design.task
+        low, high = INDEX_RANGE
+        largest = task.largest_coil(design.wire)
+        checks = (
+            ("shear stress", design.stress / 1e6, task.allowed_stress / 1e6, "N/mm2",
+             design.stress <= task.allowed_stress),
+            ("coil diameter", 1e3 * design.coil, 1e3 * largest, "mm", design.coil <= largest),
+            ("least spring index", design.index, low, "1", design.index >= low),
+            ("greatest spring index", design.index, high, "1", design.index <= high),
+        )  # fmt: skip
+        keys = ("name", "value", "limit", "unit", "passed")
+        return {
+            "status": "pass" if self.feasible else "fail",
+            "checks": [dict(zip(keys, check, strict=True)) for check in checks],
+            "design": {**design.to_dict(), "radial_force_N": self.radial_force},
+            "feasible": [item.to_dict() for item in self.others],
+        }
+
+
+def size_spring(
+    *,
+    wire: Quantity = "3 mm",
+    coil: Quantity = "34 mm",
+    torque: Quantity = "12 N m",
+    guide: Quantity = "160 mm",
+    force: Quantity = "80 N",
+    extension: Quantity = "1.3 m",
+    modulus: Quantity = "81500 N/mm2",
+    strength: Quantity = "1730 N/mm2",
+    safety: Quantity = "2",
+    longest: Quantity = "1.1 m",
+    mover: Quantity = "10 mm",
+) -> SpringSizing:
+    """Return a spring of the load module judged, and other designs that do as well.
+
+    Parameters
+    ----------
+    wire : quantity
+        Wire diameter.
+    coil : quantity
+        Mean coil diameter.
+    torque : quantity
+        Greatest torque on the gearbox.
+    guide : quantity
+        Diameter of the winding guide.
+    force : quantity
+        Design force of each spring.
+    extension : quantity
+        Extension at that force.
+    modulus : quantity
+        Shear modulus of the wire.
+    strength : quantity
+        Strength of the wire.
+    safety : quantity
+        Safety factor.
+    longest : quantity
+        Greatest free length of other designs.
+    mover : quantity
+        Displacement of the mover.
+
+    Raises
+    ------
+    InputError
+        A number that is not above 0, a force below what the torque needs, a wrong unit.
+    """
+    task = SpringTask(
+        torque=parse_quantity(torque, "N m", "--torque"),
+        guide_diameter=parse_quantity(guide, "m", "--guide"),
+        force=parse_quantity(force, "N", "--force"),
+        extension=parse_quantity(extension, "m", "--extension"),
+        shear_modulus=parse_quantity(modulus, "N/m2", "--modulus"),
+        strength=parse_quantity(strength, "N/m2", "--strength"),
+        safety=parse_quantity(safety, "1", "--safety"),
+    )
+    chosen = design_spring(
+        task, wire=parse_quantity(wire, "m", "--wire"), coil=parse_quantity(coil, "m", "--coil")
+    )
+    others = search_springs(task, longest=parse_quantity(longest, "m", "--longest"))
+    return SpringSizing(chosen, others, parse_quantity(mover, "m", "--mover"))

@@ -12,6 +12,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
 from elevon.actuator import Actuator
 from elevon.calibrate.drops import is_drop_table, run_drops
@@ -24,6 +25,7 @@ from elevon.calibrate.ways import (
     validate_any,
 )
 from elevon.logs.read import LogsLike, as_logs
+from elevon.option import Option
 from elevon.progress import Progress
 from elevon.simulate.prepare import ActuatorLike, as_actuator
 
@@ -33,7 +35,7 @@ def calibrate(
     actuator: ActuatorLike,
     free: Sequence[str] | None = None,
     *,
-    per_log: Sequence[str] = (),
+    per_log: Annotated[Sequence[str], Option(metavar="PATH")] = (),
     fidelity: str | None = None,
     transient: float | None = None,
     promise: bool = False,
@@ -52,11 +54,12 @@ def calibrate(
     free : sequence of str, optional
         Paths to estimate; default: all that the logs determine.
     per_log : sequence of str
-        Estimated for each log too; only where both positions were logged.
+        Estimated for each log too, such as ``backlash.total``; only where both positions were
+        logged.
     fidelity : str, optional
         Of the model runs, ``low`` or ``high``; default: low, or what the logs bear.
     transient : float, optional
-        Seconds left out at the beginning of each log.
+        Left out at the beginning of each log [s].
     promise : bool
         Whether logs are held out in turn: what an actuator file takes its thresholds from.
     torque_constant : str or float, optional
@@ -123,7 +126,7 @@ def validate(
     fidelity : str
         ``low`` or ``high``.
     transient : float, optional
-        Seconds left out; default: the actuator file's.
+        Left out at the beginning of each log [s]; default: the actuator file's.
     progress : callable, optional
         Called with the done fraction; returns False to stop.
 

@@ -25,6 +25,7 @@ from elevon.plain import WORKING, Plain, key
 from elevon.progress import Progress, part
 from elevon.recording import Recording
 from elevon.scenario import Scenario
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 if TYPE_CHECKING:
     from elevon.report import Report
@@ -216,7 +217,7 @@ def _starved(volts: float, brake: float) -> Scenario:
 
 
 def fit_low(
-    actuator: Actuator,
+    actuator: ActuatorLike,
     cases: Sequence[FitCase],
     *,
     seed: int = 0,
@@ -226,7 +227,7 @@ def fit_low(
 
     Parameters
     ----------
-    actuator : Actuator
+    actuator : Actuator, str or path
         Its drive kind as set: the numbers belong to it.
     cases : sequence of FitCase
         At least one; the switching model runs each once.
@@ -248,10 +249,11 @@ def fit_low(
     """
     from elevon.simulate.acting import together
 
-    free = _free(actuator)
+    model = as_actuator(actuator)
+    free = _free(model)
     _check(cases)
-    with together((actuator, case.scenario, name) for case in cases for name in RATES):
-        return _fitted(actuator, cases, free, seed, progress)
+    with together((model, case.scenario, name) for case in cases for name in RATES):
+        return _fitted(model, cases, free, seed, progress)
 
 
 def _fitted(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from elevon.cli import common, interrupt
 from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar
-from elevon.cli.shell import Answer, command
+from elevon.cli.shell import Answer, DoorCall, command
+from elevon.option import Option
 
 if TYPE_CHECKING:
     from elevon.bench.procedure import Procedure
@@ -34,70 +35,64 @@ def list_procedures() -> Answer:
     return Answer({"procedures": rows}, show)
 
 
-@command(app, "strict")
-def run(
-    procedure: str,
-    *,
-    actuator: str,
-    out: Path,
-    fault: list[str] | None = None,
-    settings: list[str] | None = None,
-    seed: int = 0,
-    fidelity: str = "high",
-    current: str = "rms",
-    shaft: str = "fast",
-    truth: Path | None = None,
-    force: bool = False,
-) -> Answer:
-    """Carry out a procedure and write what the bench writes: traces, load cell, command notes."""
+@command(app, "strict", door="elevon.doors:bench", working="bench", without=("layout",))
+def run(door: DoorCall, *, current: str = "rms", shaft: str = "fast") -> Answer:
+    """Carry out a procedure and write what the bench writes: traces, load cell, command notes.
+
+    Parameters
+    ----------
+    current : str
+        Convention of the currents: rms or peak.
+    shaft : str
+        Shaft of the encoder column: fast or slow.
+    """
     from elevon.bench.procedure import load_procedure
-    from elevon.cli.fault_options import read_faults
-    from elevon.doors import bench
     from elevon.logs.formats.drive import DriveFormat
 
-    procedure_document = load_procedure(procedure)
-    loaded = common.read_actuator(actuator, settings)
+    options = door.options
+    out, procedure = options["out"], load_procedure(str(options["procedure"]))
+    loaded = common.read_actuator(options["actuator"], options["settings"])
     ratio = loaded.parameters.value("gear.ratio") if "gear.ratio" in loaded.parameters else 1.0
-    faults = read_faults(fault, loaded.wiring)
     layout = DriveFormat(encoder_shaft=shaft, current_convention=current, gear_ratio=ratio)
-    with (
-        interrupt.telling(lambda: _story(out, procedure_document, force=force)),
-        progress_bar(f"bench: {procedure_document.name}") as advance,
-    ):
-        result = bench(
-            procedure_document,
-            loaded,
-            out,
-            faults=faults,
-            seed=seed,
-            fidelity=fidelity,
-            layout=layout,
-            truth=truth,
-            force=force,
-            progress=advance,
-        )
+    with interrupt.telling(lambda: _story(out, procedure, force=options["force"])):
+        result: BenchResult = door(procedure=procedure, actuator=loaded, layout=layout)
     return Answer(result, lambda: _print(result, out))
 
 
 @command(app)
 def fly(
-    flight: Path,
+    flight: Annotated[Path, Option(metavar="FLIGHT")],
     *,
     actuator: str,
-    out: Path,
+    out: Annotated[Path, Option(metavar="DIR")],
     fault: list[str] | None = None,
     settings: list[str] | None = None,
     load_factor: float = 0.0,
-    vibration: str = "0 m/s2",
-    switch: str = "10 s",
+    vibration: Annotated[str, Option(metavar="QUANTITY")] = "0 m/s2",
+    switch: Annotated[str, Option(metavar="QUANTITY")] = "10 s",
     seed: int = 0,
     fidelity: str = "high",
     force: bool = False,
 ) -> Answer:
-    """Fly a nominal and a faulty actuator under one load, switched between them in flight."""
+    """Fly a nominal and a faulty actuator under one load, switched between them in flight.
+
+    Parameters
+    ----------
+    flight : path
+        A scenario that elevon loads has written.
+    out : path
+        Folder for nominal.csv and faulty.csv.
+    fault : list of str
+        Of the second actuator: 'KIND@PLACE=VALUE[unit]...'; repeatable.
+    load_factor : float
+        Along the rams, in g.
+    vibration : quantity
+        RMS along the rams.
+    switch : quantity
+        Time for which the load stays on one actuator.
+    """
     from elevon.bench.flyable import FlightConditions, claim_flight, write_flight
     from elevon.bench.flyable import fly as flown
-    from elevon.cli.fault_options import read_faults
     from elevon.scenario import Scenario
     from elevon.units import parse_quantity
 
@@ -106,7 +101,7 @@ def fly(
     claim_flight(out, force=force)
     with progress_bar("flying") as advance:
         logs = flown(
-            unit, Scenario.load(flight), read_faults(fault, unit.wiring), aircraft,
+            unit, Scenario.load(flight), common.read_faults(fault, unit.wiring), aircraft,
             switch=parse_quantity(switch, "s", "--switch"), seed=seed, fidelity=fidelity,
             progress=advance,
         )  # fmt: skip

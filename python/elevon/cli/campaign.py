@@ -6,31 +6,40 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from elevon.cli import campaign_analysis, interrupt
+from elevon.cli import interrupt
 from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
-from elevon.cli.shell import Answer, command
+from elevon.cli.shell import Answer, DoorCall, command
+from elevon.option import Option
 from elevon.plain import fields_of
 
 if TYPE_CHECKING:
+    from elevon.analysis.effects import Effects
     from elevon.campaign.execute import CampaignResult
 
 app = group("Run plans of many labelled simulations.")
-campaign_analysis.add_to(app)
 
 
 @command(app)
 def plan(
-    plan: Path,
+    plan: Annotated[Path, Option(metavar="PLAN")],
     *,
     threads: int | None = None,
     allow_outside: bool = False,
 ) -> Answer:
-    """Check a plan and say what it will take; nothing is written."""
+    """Check a plan and say what it will take; nothing is written.
+
+    Parameters
+    ----------
+    plan : path
+        The plan file (TOML).
+    allow_outside : bool
+        Let the plan read files outside its folder.
+    """
     from elevon.campaign import load_plan, resolve_plan
     from elevon.campaign.check import check, estimate
     from elevon.simulate.batch import checked_threads
@@ -86,15 +95,29 @@ def _design_lines(design: dict[str, Any]) -> Iterator[str]:
 
 @command(app, "strict")
 def run(
-    plan: Path,
+    plan: Annotated[Path, Option(metavar="PLAN")],
     *,
-    out: Path,
+    out: Annotated[Path, Option(metavar="DIR")],
     threads: int | None = None,
-    scheduler: str | None = None,
-    cluster: str | None = None,
+    scheduler: Annotated[str | None, Option(metavar="ADDRESS")] = None,
+    cluster: Annotated[str | None, Option(metavar="local:N")] = None,
     allow_outside: bool = False,
 ) -> Answer:
-    """Run a plan into a folder; an interrupted one goes on where it was."""
+    """Run a plan into a folder; an interrupted one goes on where it was.
+
+    Parameters
+    ----------
+    plan : path
+        The plan file (TOML).
+    out : path
+        Folder of the results; resumed if begun.
+    scheduler : str
+        Of a Dask scheduler.
+    cluster : str
+        N Dask workers started here.
+    allow_outside : bool
+        Let the plan read files outside its folder.
+    """
     from elevon.campaign import load_plan, resolve_plan, run_campaign
 
     read, document = load_plan(plan)
@@ -108,10 +131,18 @@ def resume(
     folder: Path,
     *,
     threads: int | None = None,
-    scheduler: str | None = None,
-    cluster: str | None = None,
+    scheduler: Annotated[str | None, Option(metavar="ADDRESS")] = None,
+    cluster: Annotated[str | None, Option(metavar="local:N")] = None,
 ) -> Answer:
-    """Go on with a campaign from its folder; the plan file is not needed."""
+    """Go on with a campaign from its folder; the plan file is not needed.
+
+    Parameters
+    ----------
+    scheduler : str
+        Of a Dask scheduler.
+    cluster : str
+        N Dask workers started here.
+    """
     from elevon.campaign import resume_campaign
 
     work = partial(resume_campaign, folder)
@@ -223,3 +254,35 @@ def _range(column: Any) -> str:
     if not column.numeric:
         return ", ".join(dict.fromkeys(str(value) for value in column.values))[:60]
     return f"{column.values.min():.6g} to {column.values.max():.6g}"
+
+
+@command(app, "report", "force", door="elevon.doors:effects")
+def effects(door: DoorCall) -> Answer:
+    """Say which factors move a response, and by how much: main effects and interactions."""
+    result: Effects = door()
+    return Answer(result, lambda: _print_effects(result), page=result.report)
+
+
+def _print_effects(effects: Effects) -> None:
+    from elevon.analysis.effects import EQUAL_REPEATS
+
+    rows = [
+        [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)]
+        for t in effects.terms
+    ]
+    answer(effects.headline, f"by {effects.method}")
+    print_table(("term", "factors", "effect", "interval", "aliased with"), rows)
+    for text, names in (
+        ("confounded with the blocks", effects.blocked),
+        ("left out, partly aliased", effects.partial),
+    ):
+        if names:
+            typer.echo(f"{text}: {', '.join(names)}")
+    if effects.equal_repeats:
+        typer.echo(EQUAL_REPEATS)
+
+
+def _interval(term: Any) -> str:
+    if term.low is None:
+        return "not known"
+    return f"{term.low:.4g} to {term.high:.4g}{' *' if term.significant else ''}"

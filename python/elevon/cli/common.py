@@ -1,4 +1,4 @@
-"""Options that several commands share, and turning them into actuators and scenarios."""
+"""What is given on the command line, read: settings, actuators, faults, scenarios, logs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elevon.cli.output import say
-from elevon.errors import InputError
+from elevon.errors import InputError, UnitError
 from elevon.files import check_output
+from elevon.units import display_unit, format_quantity, split_quantity
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
+    from elevon.faults import Fault, FaultRecord
     from elevon.logs.log import Log
     from elevon.parameters import Parameter
     from elevon.scenario import Scenario
@@ -75,7 +77,6 @@ def read_scenario(
     faults: Sequence[str] | None = None,
 ) -> Scenario:
     """Read a scenario file, or the actuator's own, and apply ``--duration`` and ``--fault``."""
-    from elevon.cli.fault_options import read_faults
     from elevon.simulate.prepare import as_scenario
 
     scenario = as_scenario(path, actuator)
@@ -86,6 +87,46 @@ def read_scenario(
     for line in changes(actuator, actuator.with_values(scenario.parameters, place=str(path or ""))):
         say(f"scenario: {line}")
     return scenario
+
+
+def read_faults(texts: Sequence[str] | None, wiring: str) -> list[Fault]:
+    """Read ``--fault`` options; each is said as it was read.
+
+    Raises
+    ------
+    UnitError
+        A severity without a unit where the fault has one: 0.5 could be degrees or radians.
+    InputError
+        The text does not follow the grammar; a kind, place or severity that cannot be.
+    """
+    from elevon.faults import Fault, find_record
+
+    faults = [Fault.parse(text) for text in texts or ()]
+    for fault in faults:
+        record = find_record(fault.kind, fault.place, wiring, "--fault")
+        name = f"--fault {fault.kind}@{fault.place}"
+        parts = split_quantity(str(fault.severity))
+        unit = record.unit or "1"
+        if unit != "1" and parts is not None and not parts[1] and float(parts[0]) != 0.0:
+            display = display_unit(unit)
+            raise UnitError(
+                f"{name}: {parts[0]} has no unit; write '{parts[0]} {display}'"
+                + (f" or '{parts[0]} {unit}'" if display != unit else "")
+                + f" ({record.effect})"
+            )
+        say(f"fault {fault.kind}@{fault.place}: {_in_words(record, fault, name)}")
+    return faults
+
+
+def _in_words(record: FaultRecord, fault: Fault, name: str) -> str:
+    """Write a severity as a person reads it: a share in percent, a growth with its sign."""
+    value = record.read_severity(fault.severity, name)
+    unit = record.unit or "1"
+    if unit != "1":
+        return format_quantity(value, display_unit(unit))
+    if record.switched:
+        return f"{value:g}"
+    return f"{100.0 * value:{'+' if record.maximum > 1.0 else ''}.6g} %"
 
 
 def check_outputs(outputs: Sequence[Path | None], *, force: bool) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
 from elevon.cli.groups import group
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
+from elevon.option import Option
 
 app = group("Describe, verify, export, split a data set.")
 
@@ -65,12 +66,22 @@ def verify(folder: Path) -> Answer:
 def export(
     folder: Path,
     *,
-    out: Path,
-    form: str = "mat",
-    runs: str | None = None,
+    out: Annotated[Path, Option(metavar="DIR")],
+    form: Annotated[str, Option("--format")] = "mat",
+    runs: Annotated[str | None, Option(metavar="LIST")] = None,
     force: bool = False,
 ) -> Answer:
-    """Write one file a run and a table of the runs, for MATLAB and other programs."""
+    """Write one file a run and a table of the runs, for MATLAB and other programs.
+
+    Parameters
+    ----------
+    out : path
+        Folder of the files.
+    form : str
+        mat, csv, nc or parquet.
+    runs : str
+        Such as 0-99,250; default all.
+    """
     from elevon.campaign import load_campaign
     from elevon.campaign.export import export as exported
     from elevon.campaign.export import run_numbers
@@ -92,11 +103,21 @@ def export(
 def split(
     folder: Path,
     *,
-    share: list[str],
+    share: Annotated[list[str], Option(metavar="NAME=SHARE")],
     by: str | None = None,
-    seed: int = 0,
+    seed: Annotated[int, Option(min=0)] = 0,
 ) -> Answer:
-    """Deal whole units or draws to parts anew; the samples stay as they are."""
+    """Deal whole units or draws to parts anew; the samples stay as they are.
+
+    Parameters
+    ----------
+    share : list of str
+        A part; repeatable.
+    by : str
+        unit or draw; default unit where there are units.
+    seed : int
+        Seed of the dealing.
+    """
     from elevon.campaign.resplit import resplit
 
     counts = resplit(folder, _shares(share), by=by, seed=seed)

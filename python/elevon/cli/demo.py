@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from elevon.cli import interrupt
 from elevon.cli.output import answer, print_table, progress_bar, say
 from elevon.cli.shell import Answer, command
+from elevon.option import Option
 
 if TYPE_CHECKING:
     from elevon.demo.life.results import LifeDemo
@@ -24,14 +25,22 @@ app = typer.Typer(rich_markup_mode=None)
 @command(app)
 def demo(
     *,
-    out: Path = Path("out/demo"),
-    which: str = "life",
+    out: Annotated[Path, Option(metavar="DIR")] = Path("out/demo"),
+    which: Annotated[str, Option("--part")] = "life",
     seed: int = 0,
     force: bool = False,
 ) -> Answer:
     """Let a unit live and predict its end from bench logs; one page tells the story.
 
     Interrupted, it goes on where it was when the same command is given again.
+
+    Parameters
+    ----------
+    out : path
+        Folder for reports and logs.
+    which : str
+        life: a unit wears, is inspected, diagnosed, its end predicted. bench: a published table,
+        then a bench's hidden values from its logs.
     """
     from elevon.errors import unknown
     from elevon.report.checks import all_passed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import typer
@@ -44,9 +45,26 @@ class NamingGroup(typer.core.TyperGroup):
             formatter.write_dl(rows)
 
 
-def group(text: str, kind: type[NamingGroup] = NamingGroup) -> typer.Typer:
+class CommandGroup(typer.Typer):
+    """A program of several commands; those of doors are added when it is first looked into."""
+
+    def __init__(self, **words: Any) -> None:
+        super().__init__(**words)
+        self.waiting: list[Callable[[], None]] = []
+
+    def complete(self) -> CommandGroup:
+        """Add the commands that wait for their doors' signatures."""
+        while self.waiting:
+            self.waiting.pop(0)()
+        for inner in self.registered_groups:
+            if isinstance(inner.typer_instance, CommandGroup):
+                inner.typer_instance.complete()
+        return self
+
+
+def group(text: str, kind: type[NamingGroup] = NamingGroup) -> CommandGroup:
     """Return a group of commands; it stays one where it has a single command."""
-    app = typer.Typer(no_args_is_help=True, cls=kind, rich_markup_mode=None, help=text)
+    app = CommandGroup(no_args_is_help=True, cls=kind, rich_markup_mode=None, help=text)
     app.callback()(lambda: None)
     return app
 

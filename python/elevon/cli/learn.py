@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,7 @@ from elevon.cli import common
 from elevon.cli.output import answer, listed, print_table, progress_bar
 from elevon.cli.shell import Answer, command
 from elevon.errors import InputError
+from elevon.option import Option
 
 if TYPE_CHECKING:
     from elevon.diagnose.learning.model import LearnedModel
@@ -21,11 +22,11 @@ _RATE = 0.05  # of false alarms, by default
 
 @command(app, "strict", "details")
 def learn(
-    logs: list[Path],
+    logs: Annotated[list[Path], Option(metavar="LOG")],
     *,
     labels: Path | None = None,
-    out: Path,
-    actuator: str | None = None,
+    out: Annotated[Path, Option(metavar="MODEL")],
+    actuator: Annotated[str | None, Option(complete="actuators")] = None,
     pole_pairs: float | None = None,
     loadcell: list[Path] | None = None,
     command: list[Path] | None = None,
@@ -34,7 +35,21 @@ def learn(
     seed: int = 0,
     force: bool = False,
 ) -> Answer:
-    """Learn classes, severities and how healthy days differ, from labelled logs or a data set."""
+    """Learn classes, severities and how healthy days differ, from labelled logs or a data set.
+
+    Parameters
+    ----------
+    logs : list of path
+        Drive logs, or one folder of a campaign.
+    labels : path
+        Table (CSV): log, label; unit, condition, severity, healthy, day.
+    out : path
+        Model to write (.npz).
+    actuator : str
+        Learn how healthy days differ, against this actuator.
+    pole_pairs : float
+        Of the motor; default: the actuator's.
+    """
     from elevon.diagnose.learning.door import as_dataset
     from elevon.diagnose.learning.door import learn as run
     from elevon.diagnose.learning.labels import read_labels

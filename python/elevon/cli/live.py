@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from elevon.cli import common, interrupt
 from elevon.cli.shell import add_plain
 from elevon.errors import InputError
+from elevon.option import Option
 
 if TYPE_CHECKING:
     from elevon.live.bench import LiveBench
@@ -21,27 +22,59 @@ app = typer.Typer(rich_markup_mode=None)
 
 @add_plain(app)
 def live(
-    actuator: str = "torino-rotary",
+    actuator: Annotated[
+        str, Option(metavar="ACTUATOR|FILE", complete="actuators")
+    ] = "torino-rotary",
     *,
     fidelity: str = "high",
     calibrated: Path | None = None,
     baseline: list[Path] | None = None,
     mission: Path | None = None,
-    port: int = 8484,
+    port: Annotated[int, Option(min=0, max=65535)] = 8484,
     host: str = "127.0.0.1",
     no_browser: bool = False,
-    factor: float = 1.0,
-    out: Path = Path(),
+    factor: Annotated[float, Option(min=0.1, max=100.0)] = 1.0,
+    out: Annotated[Path, Option(metavar="DIR")] = Path(),
     hide_truth: bool = False,
-    map_: Path | None = None,
-    model: str = "torino-rotary",
-    static: Path | None = None,
+    map_: Annotated[Path | None, Option("--map")] = None,
+    model: Annotated[str, Option(metavar="ACTUATOR")] = "torino-rotary",
+    static: Annotated[Path | None, Option(metavar="DIR")] = None,
     picture: Path | None = None,
     force: bool = False,
     seed: int = 0,
     settings: list[str] | None = None,
 ) -> None:
-    """Show an actuator at real time in the browser: move it, break it, watch it being found out."""
+    """Show an actuator at real time in the browser: move it, break it, watch it being found out.
+
+    Parameters
+    ----------
+    actuator : str
+        Actuator by name or file, or a log or recording to replay.
+    calibrated : path
+        Actuator file, as elevon calibrate writes it.
+    mission : path
+        Mission, for the remaining life.
+    port : int
+        0: a free one.
+    host : str
+        Address to listen on; not loopback: a token is needed.
+    no_browser : bool
+        Open no page.
+    factor : float
+        Simulated over wall time.
+    out : path
+        Where recordings go.
+    hide_truth : bool
+        Tell nobody which faults were set.
+    map_ : path
+        Column map (TOML).
+    model : str
+        Model beside the log that is replayed.
+    static : path
+        Write the page with a recorded session instead.
+    picture : path
+        Write that session as an animated SVG instead.
+    """
     common.check_outputs([static / "index.html" if static else None, picture], force=force)
     bench: LiveBench | LogReplay
     if map_ is not None or _is_log(actuator):

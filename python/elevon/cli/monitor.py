@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -14,6 +14,7 @@ from elevon.cli.shell import add_plain
 from elevon.errors import InputError
 from elevon.files import check_output
 from elevon.number_text import severity_texts
+from elevon.option import Option
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -26,14 +27,14 @@ app = typer.Typer(rich_markup_mode=None)
 
 @add_plain(app)
 def monitor(
-    logs: list[Path],
+    logs: Annotated[list[Path], Option(metavar="LOG")],
     *,
     actuator: str,
-    baseline: list[Path],
+    baseline: Annotated[list[Path], Option(metavar="LOG")],
     window: str | None = None,
     false_alarm_time: str = "1 h",
-    fault: list[str] | None = None,
-    days: int | None = None,
+    fault: Annotated[list[str] | None, Option(metavar="KIND@PLACE")] = None,
+    days: Annotated[int | None, Option(min=1)] = None,
     longest: str | None = None,
     state: Path | None = None,
     loadcell: list[Path] | None = None,
@@ -44,7 +45,27 @@ def monitor(
     details: bool = False,  # noqa: ARG001 - its callback does the work
     json: bool = False,
 ) -> None:
-    """Watch logs window by window, in the order given, each a day of the unit; alarm at a fault."""
+    """Watch logs window by window, in the order given, each a day of the unit; alarm at a fault.
+
+    Parameters
+    ----------
+    logs : list of path
+        Drive logs; - reads lines from standard input as they come.
+    baseline : list of path
+        Healthy log of it; repeatable.
+    window : str
+        Width of a window, such as '5 s'; default: period of the noted sine.
+    false_alarm_time : str
+        Mean time between false alarms.
+    fault : list of str
+        Candidate; repeatable. Default: all.
+    days : int
+        Days on which the unit is watched. Default: the logs; -: one.
+    longest : str
+        Longest of those days. Default: the logs'; -: that of the baselines.
+    state : path
+        Of -: where the stream stands; goes on from there.
+    """
     options = WatchOptions(
         window=None if window is None else parse_quantity(window, "s", "--window"),
         false_alarm_time=parse_quantity(false_alarm_time, "s", "--false-alarm-time"),

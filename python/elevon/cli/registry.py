@@ -1,31 +1,82 @@
-"""Which commands exist and where they live."""
+"""Which commands exist and where they live; another package adds its own by an entry point.
+
+An entry point of the group `ENTRY_POINTS` names the command and its program: ``reproduce =
+"package.module:app"``. It is loaded when the command is requested.
+"""
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
 
 from elevon.data import packaged_toml
+
+if TYPE_CHECKING:
+    import typer
+
+#: Group of entry points whose objects are programs of further commands.
+ENTRY_POINTS = "elevon.commands"
 
 
 @dataclass(frozen=True, slots=True)
 class CommandEntry:
-    """One command: the module of its ``app``, its line in ``elevon --help``, and its purpose."""
+    """One command: where its program is, its line in ``elevon --help``, and its purpose.
 
-    module: str
+    Attributes
+    ----------
+    place : str
+        ``MODULE:NAME`` of a `typer.Typer` or an `elevon.cli.shell.TerminalCommand`.
+    help, group : str
+        The line, and what it stands under.
+    """
+
+    place: str
     help: str
     group: str
 
-    @property
-    def available(self) -> bool:
-        """Whether the module is part of this installation."""
-        return importlib.util.find_spec(self.module) is not None
+    def load(self) -> typer.Typer:
+        """Import the command and return its program."""
+        from elevon.cli.groups import CommandGroup
+        from elevon.cli.shell import TerminalCommand
+
+        module, _, name = self.place.partition(":")
+        loaded = getattr(import_module(module), name)
+        if isinstance(loaded, CommandGroup):
+            return loaded.complete()
+        return loaded.app() if isinstance(loaded, TerminalCommand) else loaded
 
 
-#: Modules whose name is a word of Python.
-_MODULES = {"import": "import_log"}
-COMMANDS = {
-    name: CommandEntry(f"elevon.cli.{_MODULES.get(name, name.replace('-', '_'))}", text, group)
-    for group, commands in packaged_toml("elevon.cli", "commands.toml")["purposes"].items()
-    for name, text in commands.items()
+#: Modules of the commands that do not stand in one of their own.
+_MODULES = {
+    "actuators": ("list:listing", "show", "new", "check"),
+    "simulating": ("simulate", "compare", "response", "fit-low", "loads", "design"),
+    "recordings": ("import:import_", "plot", "features"),
+    "judging": ("doctor", "calibrate", "validate", "diagnose", "next-test"),
+    "lives": ("predict", "next-inspection", "fleet"),
+    "elsewhere": ("export", "safety"),
 }
+
+
+@cache
+def commands() -> dict[str, CommandEntry]:
+    """Return every command of this installation, in the order of work."""
+    places = {}
+    for module, names in _MODULES.items():
+        for text in names:
+            name, _, attribute = text.partition(":")
+            places[name] = f"elevon.cli.{module}:{attribute or name.replace('-', '_')}"
+    entries = {
+        name: CommandEntry(
+            places.get(name, f"elevon.cli.{name.replace('-', '_')}:app"), text, group
+        )
+        for group, lines in packaged_toml("elevon.cli", "commands.toml")["purposes"].items()
+        for name, text in lines.items()
+    }
+    for point in entry_points(group=ENTRY_POINTS):
+        known = entries.get(point.name)
+        text = known.help if known else f"Added by {point.value.partition('.')[0]}."
+        entries[point.name] = CommandEntry(point.value, text, known.group if known else "Elsewhere")
+    return entries

@@ -16,7 +16,7 @@ import typer
 
 from elevon.cli import completion, interrupt
 from elevon.cli.groups import NamingGroup, UsageError
-from elevon.cli.registry import COMMANDS
+from elevon.cli.registry import commands
 from elevon.errors import ElevonError, ElevonWarning, Interrupted
 from elevon.extras import missing_package
 from elevon.files import journal
@@ -34,29 +34,28 @@ class LazyGroup(NamingGroup):
 
     def list_commands(self, ctx: object) -> list[str]:  # noqa: ARG002 - click's signature
         """Names of the commands of this installation, in the registry's order."""
-        return [name for name, command in COMMANDS.items() if command.available]
+        return list(commands())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:  # noqa: ARG002 - click's signature
         """Load one command, or None when there is no such command."""
-        command = COMMANDS.get(cmd_name)
-        if command is None or not command.available:
+        entry = commands().get(cmd_name)
+        if entry is None:
             return None
-        app = importlib.import_module(command.module).app
-        loaded = typer.main.get_command(app)
+        loaded = typer.main.get_command(entry.load())
         loaded.name = cmd_name
         # Completion is installed for the program, not for one of its commands.
         loaded.params = [item for item in loaded.params if item.name not in _ROOT_ONLY]
         return loaded
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
+    def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click's signature
         """Write the commands by purpose from the registry, importing none of them."""
-        names = self.list_commands(ctx)
-        widest = max(len(name) for name in names)
-        for group in dict.fromkeys(COMMANDS[name].group for name in names):
+        entries = commands()
+        widest = max(len(name) for name in entries)
+        for group in dict.fromkeys(entry.group for entry in entries.values()):
             rows = [
-                (name.ljust(widest), COMMANDS[name].help)
-                for name in names
-                if COMMANDS[name].group == group
+                (name.ljust(widest), entry.help)
+                for name, entry in entries.items()
+                if entry.group == group
             ]
             with formatter.section(group):
                 formatter.write_dl(rows)

@@ -7,11 +7,12 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Annotated, Any
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, unknown
 from elevon.faults import Fault, FaultRecord, catalogue, check_together
+from elevon.option import Option
 from elevon.parameters.records import wirings
 from elevon.record_plan import record_plan
 from elevon.scenario.compile import port_units, signal_records
@@ -110,7 +111,7 @@ def run_document(
     *,
     fidelity: str = "high",
     mode: str | None = None,
-    signals: str | Sequence[str] = (),
+    signals: Annotated[str | Sequence[str], Option(metavar="NAMES", complete="signals")] = (),
 ) -> RunDocument:
     """Resolve an actuator for another tool.
 
@@ -124,7 +125,7 @@ def run_document(
         What the command demands; by default the first of the wiring's: position, or a gear's
         commands.
     signals : str or sequence of str
-        Names or groups beyond those of the drive log.
+        Outputs beyond the drive log's: names or groups, by commas or repeated.
 
     Returns
     -------

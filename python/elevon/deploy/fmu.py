@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import elevon
 from elevon.actuator import Actuator
@@ -24,6 +25,7 @@ from elevon.deploy.description import (
 from elevon.deploy.document import RunDocument, as_text, run_document, token_of
 from elevon.errors import InputError, unknown
 from elevon.files import check_output, write_bytes
+from elevon.option import Option, Quantity
 from elevon.units import parse_quantity
 
 #: Where the build puts the binary.
@@ -134,13 +136,13 @@ class FmuFile:
 
 def export_fmu(
     actuator: Actuator | str,
-    path: str | os.PathLike[str],
+    path: Annotated[str | os.PathLike[str], Option(("--out", "-o"))],
     *,
     fidelity: str = "high",
     version: str = "3.0",
     mode: str | None = None,
-    signals: str | Sequence[str] = (),
-    step: float | str = "1 ms",
+    signals: Annotated[str | Sequence[str], Option(metavar="NAMES", complete="signals")] = (),
+    step: Quantity = "1 ms",
     platform: str | None = None,
     force: bool = False,
 ) -> FmuFile:
@@ -151,20 +153,20 @@ def export_fmu(
     actuator : Actuator or str
         A loaded one, a name or a path.
     path : path
-        The file, ending in ``.fmu``.
+        The file to write, ending in ``.fmu``.
     fidelity : str
         ``high`` or ``low``.
     version : str
-        Of FMI, ``2.0`` or ``3.0``.
+        Of FMI: ``2.0`` or ``3.0``.
     mode : str, optional
         What the command demands; by default position, or a gear's commands.
     signals : str or sequence of str
-        Outputs beyond the drive log's: names or groups, as for `record`.
+        Outputs beyond the drive log's: names or groups, by commas or repeated.
     step : float or str
         The suggested communication step, s or with a unit: a whole number of solver steps. An
         importer may use any other such step.
     platform : str, optional
-        As FMI 3.0 names it; this installation's.
+        Name as in FMI 3.0, such as ``x86_64-linux``; default: this installation's.
     force : bool
         Replace an existing file.
 

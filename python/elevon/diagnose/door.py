@@ -6,34 +6,33 @@ import os
 import time as clock
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from elevon.diagnose.by_model import diagnose as diagnose_by_model
 from elevon.diagnose.by_model import traces_of
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.learning.answer import diagnose_by_classes, diagnose_by_spread_and_classes
+from elevon.diagnose.learning.model import LearnedModel
 from elevon.diagnose.monitor.answer import Monitoring
 from elevon.diagnose.monitor.monitor import FALSE_ALARM_TIME, Monitor
 from elevon.errors import InputError
-from elevon.logs.read import as_logs
-from elevon.simulate.prepare import as_actuator
+from elevon.logs.read import LogsLike, as_logs
+from elevon.option import Option
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.learning.model import LearnedModel
     from elevon.diagnose.pictures import Traces
     from elevon.logs.log import Log
-    from elevon.logs.read import LogsLike
-    from elevon.simulate.prepare import ActuatorLike
 
 
 def diagnose(
     logs: LogsLike,
     actuator: ActuatorLike,
-    baselines: LogsLike = (),
+    baselines: Annotated[LogsLike, Option("--baseline", "LOG")] = (),
     *,
     model: LearnedModel | str | os.PathLike[str] | None = None,
-    faults: Sequence[str] | None = None,
+    faults: Annotated[Sequence[str] | None, Option("--fault", "KIND@PLACE")] = None,
     false_alarm: float = 0.05,
 ) -> Diagnosis:
     """Say what is wrong with the unit that wrote the logs, where, how bad, how sure.
@@ -47,8 +46,9 @@ def diagnose(
     baselines : Log, path, or sequence of them
         Of the healthy unit; those of the same test serve.
     model : LearnedModel or path, optional
-        By `elevon.learn`. Its spread takes the place of the stated one; its classes answer in
-        place of the actuator's model, or, where it holds both, what that model cannot name.
+        Learnt by `elevon.learn`: spread, classes or both. Its spread takes the place of the
+        stated one; its classes answer in place of the actuator's model, or, where it holds both,
+        what that model cannot name.
     faults : sequence of str, optional
         ``KIND@PLACE`` of the candidates; default: all.
     false_alarm : float
@@ -103,8 +103,6 @@ def _signed(
 
 def _model(given: LearnedModel | str | os.PathLike[str] | None) -> LearnedModel:
     """Return what was learnt, read where it is a file; without a model nothing."""
-    from elevon.diagnose.learning.model import LearnedModel
-
     if isinstance(given, LearnedModel):
         return given
     return LearnedModel() if given is None else LearnedModel.load(given)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 from elevon.calibrate.door import validate
 from elevon.calibrate.validation import TRANSIENT, Validation
@@ -16,12 +16,12 @@ from elevon.logs.log import Log
 from elevon.logs.maps.column_map import ColumnMap, find_map
 from elevon.logs.maps.guess import guess_text
 from elevon.logs.read import ForeignLog, import_foreign, named_apart
+from elevon.option import Option
 from elevon.progress import Progress, part
-from elevon.simulate.prepare import as_actuator
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.simulate.prepare import ActuatorLike
 
 T = TypeVar("T")
 PathLike = str | os.PathLike[str]
@@ -31,9 +31,9 @@ _SETTLES = 0.25  # share of a log that is left out where no actuator file states
 def doctor(
     logs: PathLike | Sequence[PathLike],
     actuator: ActuatorLike,
-    baselines: PathLike | Sequence[PathLike] = (),
+    baselines: Annotated[PathLike | Sequence[PathLike], Option("--baseline", metavar="LOG")] = (),
     *,
-    map: ColumnMap | str | Path | None = None,  # noqa: A002 - the option's name
+    map: Annotated[ColumnMap | str | Path | None, Option("--map")] = None,  # noqa: A002 - the option's name
     loadcells: Sequence[PathLike | None] = (),
     notes: Sequence[PathLike | None] = (),
     false_alarm: float = 0.05,

@@ -46,11 +46,59 @@ class LoadTable:
 
     def load_term(self, *, repeat: bool = False) -> dict[str, object]:
         """Return the table as one entry of ``load.output.terms``."""
-        return _term(self.time, self.load, "N" if self.linear else "N m", repeat)
+        return _term(self.time, self.load, self.units[0], repeat)
 
     def command_term(self, *, repeat: bool = False) -> dict[str, object]:
         """Return the position as one entry of ``command.terms``."""
-        return _term(self.time, self.position, "m" if self.linear else "rad", repeat)
+        return _term(self.time, self.position, self.units[1], repeat)
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Units of load and position."""
+        return ("N", "m") if self.linear else ("N m", "rad")
+
+    def summary(self) -> dict[str, Any]:
+        """Return the ends and scales of the table, in SI."""
+        force, length = self.units
+        return {
+            "samples": int(self.time.size),
+            "duration_s": float(self.time[-1]),
+            "load": [float(self.load.min()), float(self.load.max())],
+            "load_unit": force,
+            "position": [float(self.position.min()), float(self.position.max())],
+            "position_unit": length,
+            "load_scale": self.load_scale,
+            "position_scale": self.position_scale,
+            "mach": float(self.mach.max()),
+            "dynamic_pressure_pa": float(self.dynamic_pressure.max()),
+        }
+
+    def csv(self) -> str:
+        """Return the table as a CSV, a row an instant."""
+        force, length = self.units
+        columns = (("time", "s"), ("load", force), ("position", length),
+                   ("dynamic_pressure", "Pa"), ("mach", "1"))  # fmt: skip
+        values = [getattr(self, name) for name, _ in columns]
+        rows = (",".join(f"{value:.9g}" for value in row) for row in zip(*values, strict=True))
+        return "\n".join([",".join(f"{name} [{unit}]" for name, unit in columns), *rows]) + "\n"
+
+    def scenario_text(self) -> str:
+        """Return the scenario as a TOML file: command, load and duration."""
+        force, length = self.units
+
+        def term(place: str, values: Array, unit: str) -> str:
+            times = ", ".join(f"{t:.9g}" for t in self.time)
+            numbers = ", ".join(f"{v:.9g}" for v in values)
+            head = f'[[{place}]]\nkind = "table"\nunit = "{unit}"\n'
+            return f"{head}times = [{times}]\nvalues = [{numbers}]\n"
+
+        return (
+            f"# A flight: load scale {self.load_scale:.6g}, "
+            f"position scale {self.position_scale:.6g}\n"
+            f'duration = {self.time[-1]:.9g}\n[command]\nmode = "position"\n'
+            + term("command.terms", self.position, length)
+            + term("load.output.terms", self.load, force)
+        )
 
     def scenario(self) -> dict[str, object]:
         """Return a scenario that flies the flight: command, load and duration, in SI units."""

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import Annotated, cast
 
 from elevon.documents import Document, validated
 from elevon.errors import FormatError, InputError
@@ -18,12 +18,15 @@ from elevon.logs.log import Log
 from elevon.logs.maps.column_map import ColumnMap, find_map
 from elevon.logs.maps.guess import Guess, guess_map, guess_text
 from elevon.logs.report import ImportReport
+from elevon.option import Option
 from elevon.recording import Recording
 
 #: A column map, its file or its name; None where the headers say what is what.
 MapLike = ColumnMap | str | Path | None
 #: One log or several, read already or by their files.
-LogsLike = Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]]
+LogsLike = Annotated[
+    Log | str | os.PathLike[str] | Sequence[Log | str | os.PathLike[str]], Option(reads="logs")
+]
 
 
 def read_log(

@@ -5,23 +5,26 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.engine.candidates import candidates_of
 from elevon.nexttest.belief import read_result
 from elevon.nexttest.choose import next_test as choose
-from elevon.simulate.prepare import as_actuator
+from elevon.option import Option
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 if TYPE_CHECKING:
     from elevon.nexttest.choose import NextTest
     from elevon.progress import Progress
-    from elevon.simulate.prepare import ActuatorLike
 
 
 def next_test(
     actuator: ActuatorLike,
-    results: Sequence[Diagnosis | Mapping[str, object] | str | os.PathLike[str]] = (),
+    results: Annotated[
+        Sequence[Diagnosis | Mapping[str, object] | str | os.PathLike[str]],
+        Option("--so-far", metavar="RESULT"),
+    ] = (),
     *,
     progress: Progress | None = None,
 ) -> NextTest:
@@ -32,7 +35,7 @@ def next_test(
     actuator : Actuator, str or path
         The healthy unit, calibrated.
     results : sequence of Diagnosis, mapping or path
-        Diagnoses so far, of different logs, also as JSON.
+        Diagnoses so far, of different logs, also as JSON of elevon diagnose.
     progress : callable, optional
         Called with the done fraction; returns False to stop.
 

@@ -6,11 +6,12 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.engine.candidates import CandidateFault, candidates_of
 from elevon.errors import InputError
+from elevon.option import Option
 from elevon.prognose.answer import Prognosis
 from elevon.prognose.fleet import Costs, FleetPlan, plan_fleet
 from elevon.prognose.history import History, diagnosed, read_history
@@ -22,18 +23,17 @@ from elevon.prognose.page import prognosis_page
 from elevon.prognose.predict import predict as look_ahead
 from elevon.prognose.tabulate import respond
 from elevon.progress import Progress, part
-from elevon.simulate.prepare import as_actuator
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.prognose.response import ResponseTables
     from elevon.report import Report
-    from elevon.simulate.prepare import ActuatorLike
 
 #: Inspections as the filters take them, or the use at each diagnosis and the diagnosis.
 _Seen = Sequence[tuple[float, Diagnosis]] | Sequence[Inspection | tuple[float, Diagnosis]]
 #: A folder of inspections, or one that is read, too.
-HistoryLike = str | os.PathLike[str] | History | _Seen
+HistoryLike = Annotated[str | os.PathLike[str] | History | _Seen, Option(reads="path")]
 MissionLike = str | os.PathLike[str] | Mission
 
 
@@ -42,7 +42,7 @@ def predict(
     actuator: ActuatorLike,
     mission: MissionLike,
     *,
-    survive: Sequence[float] = (),
+    survive: Annotated[Sequence[float], Option(metavar="N")] = (),
     particles: int = 2000,
     snapshots: bool = False,
     seed: int = 0,
@@ -139,7 +139,7 @@ def next_inspection(
     actuator: ActuatorLike,
     mission: MissionLike,
     *,
-    risk: float = 0.01,
+    risk: Annotated[float, Option(metavar="P")] = 0.01,
     particles: int = 2000,
     seed: int = 0,
     progress: Progress | None = None,
@@ -202,7 +202,7 @@ def _inspected(
 
 
 def fleet(
-    histories: Sequence[HistoryLike],
+    histories: Annotated[Sequence[HistoryLike], Option(metavar="HISTORY")],
     actuator: ActuatorLike,
     mission: MissionLike,
     *,
@@ -217,12 +217,15 @@ def fleet(
     Parameters
     ----------
     histories : sequence of path, History or sequence of Inspection
-        One a unit.
+        One folder of inspections a unit.
     actuator, mission, seed, progress
         As `predict`.
-    early, late, visit : float
-        Cost of one unit of use thrown away, of a failure in service, and of a visit for all units
-        at it.
+    early : float
+        Cost of one unit of use thrown away.
+    late : float
+        Cost of a failure in service.
+    visit : float
+        Cost of a visit, for all units at it.
 
     Raises
     ------

@@ -10,12 +10,14 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError
-from elevon.plain import STORED, Plain, key
+from elevon.plain import STORED, WORKING, Plain, key
 from elevon.prognose.answer import Prognosis
 from elevon.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from elevon.report import Report
 
 _NEVER = 1e30  # a cost that no plan takes
 _INSTANTS = 400  # at which a visit may be, of each unit's remaining life
@@ -70,6 +72,8 @@ class FleetPlan(Result):
         Together.
     cost, cost_alone : float
         Expected cost of both, all units.
+    visit_cost : float or None
+        Of one visit; shown on the page.
     """
 
     unit: str
@@ -78,7 +82,9 @@ class FleetPlan(Result):
     visits: tuple[Visit, ...]
     cost: float
     cost_alone: float
+    visit_cost: Annotated[float | None, WORKING] = None
 
+    HEADINGS: ClassVar = ("unit", "remain", "90 %", "alone at", "visit at", "failed before")
     KIND: ClassVar = "fleet"
     COMPUTED: ClassVar = ("status", "rows=table", "findings")
     TABLE: ClassVar = "table"
@@ -109,9 +115,38 @@ class FleetPlan(Result):
             "p_failed_before": None if visit is None else 1.0 - item.survives(visit - 1e-9),
         }
 
+    def cells(self) -> list[tuple[str, ...]]:
+        """Return the table's rows as text, under `HEADINGS`."""
+        return [
+            (
+                str(row["unit"]),
+                _use_text(row["rul"]),
+                " to ".join(_use_text(value) for value in row["interval"]),
+                _use_text(row["alone"]),
+                _use_text(row["visit"]),
+                "-" if row["p_failed_before"] is None else f"{row['p_failed_before']:.3f}",
+            )
+            for row in self.table
+        ]
+
     def plot(self) -> Figure:
         """Return the remaining lives and the visits."""
         return fleet_figure(self)
+
+    def report(self, *, date: str | None = None) -> Report:
+        """Return the page of the plan."""
+        from elevon.report import Report, ReportTable
+
+        page = Report("Maintenance of a fleet", self.headline, date=date)
+        section = page.section(f"Remaining {self.unit}")
+        section.figure(
+            self.plot(), "Remaining life: median and 90 %; blue: the visit at which it is done."
+        )
+        price = "" if self.visit_cost is None else f"A visit costs {self.visit_cost:g}."
+        section.table(ReportTable(self.HEADINGS, self.cells(), price))
+        if self.findings:
+            section.points(self.findings)
+        return page
 
     def visit_of(self, name: str) -> float | None:
         """Return when a unit is done; None where no end of its life is in sight."""
@@ -126,6 +161,10 @@ class FleetPlan(Result):
             if self.visit_of(name) is None
         ]
         return out + [f"{n}: {text}" for n, item in self.units.items() for text in item.findings]
+
+
+def _use_text(value: float | None) -> str:
+    return "no end in sight" if value is None else f"{value:.0f}"
 
 
 def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
@@ -158,7 +197,7 @@ def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
     order = sorted(ending, key=lambda name: alone[name])
     visits, cost = _grouped(order, table, instants, costs.visit)
     single = sum(float(c.min()) for c in table.values()) + costs.visit * len(ending)
-    return FleetPlan(next(iter(kinds)), units, alone, visits, cost, single)
+    return FleetPlan(next(iter(kinds)), units, alone, visits, cost, single, costs.visit)
 
 
 def _instants(units: Iterable[Prognosis]) -> Floats:

@@ -11,12 +11,14 @@ from typing import Annotated
 from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
 from elevon.faults.catalogue import find_record
+from elevon.option import Option
 from elevon.plain import WORKING, Plain, fields_of, key
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, CheckedResult
 from elevon.safety.hazards import HAZARDS, RECORD, observe
 from elevon.safety.reasons import reason
 from elevon.safety.rows import Row, population, triples
+from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 WIRING = "landing_gear"
 CHUNK = 256
@@ -127,18 +129,22 @@ class SafetyResult(CheckedResult):
 
 
 def safety(
-    actuator: Actuator, *, seed: int = 0, every: int = 1, progress: Progress | None = None
+    actuator: ActuatorLike,
+    *,
+    seed: int = 0,
+    every: Annotated[int, Option(min=1)] = 1,
+    progress: Progress | None = None,
 ) -> SafetyResult:
     """Run every row of the campaign and judge the hazards.
 
     Parameters
     ----------
-    actuator : Actuator
+    actuator : Actuator, str or path
         With a control unit that has states: the landing gear's.
     seed : int
         Of the surroundings' order and of the triples.
     every : int
-        Only each so-manieth row: a short form.
+        Only each N-th situation: a short form.
     progress : Progress, optional
         Called with the fraction done; returns False to stop.
 
@@ -149,6 +155,7 @@ def safety(
     SimulationError
         A run diverged.
     """
+    actuator = as_actuator(actuator)
     if actuator.wiring != WIRING:
         raise InputError(
             f"{actuator.name}: its wiring {actuator.wiring} has no control unit with states whose "

@@ -315,6 +315,41 @@ def resting(actuator: Actuator, record: FaultRecord) -> list[Resting]:
     return places
 
 
+def by_drive(actuator: Actuator, record: FaultRecord) -> dict[str, object]:
+    """Return the drives under which a fault of an actuator acts, and where it rests and why.
+
+    Parameters
+    ----------
+    actuator, record
+        As `resting`.
+    """
+    neutral = resting(actuator, record)
+    drives = drive_kinds(actuator)
+    idle = {(item.fidelity, item.drive, item.place) for item in neutral}
+    acting = {
+        fidelity: [
+            drive
+            for drive in drives
+            if any((fidelity, drive, place) not in idle for place in record.places)
+        ]
+        for fidelity in record.fidelities
+    }
+    return {
+        "drives": {
+            fidelity: [name for name in names if name] for fidelity, names in acting.items()
+        },
+        "resting": [vars(item) for item in neutral],
+        "acts": " ".join(
+            _drive_text(fidelity, names) for fidelity, names in acting.items() if names
+        ),
+    }
+
+
+def _drive_text(fidelity: str, drives: Sequence[str]) -> str:
+    named = " ".join(name for name in drives if name)
+    return f"{fidelity} ({named})" if named else fidelity
+
+
 def _with_drive(actuator: Actuator, drive: str) -> npt.NDArray[np.float64]:
     vector = actuator.parameters.vector().copy()
     if drive:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrupted, SimulationError
 from elevon.faults import Fault
 from elevon.memory import check_memory
+from elevon.option import Option
 from elevon.recording import Clock, Recording
 from elevon.seam import CoreResult
 from elevon.simulate.acting import report
@@ -34,9 +35,9 @@ def simulate(
     scenario: ScenarioLike = None,
     *,
     duration: str | float | None = None,
-    faults: Sequence[Fault | str] = (),
+    faults: Annotated[Sequence[Fault | str], Option("--fault", reads="faults")] = (),
     fidelity: str = "high",
-    record: Record = None,
+    record: Annotated[Record, Option(metavar="SIGNALS@RATE", complete="signals")] = None,
     features: Features = None,
     seed: int = 0,
     number: int = 0,
@@ -60,8 +61,8 @@ def simulate(
     fidelity : str
         ``high`` or ``low``.
     record : str or sequence of str, optional
-        What is kept, such as ``["output_position", "motor_speed"]`` or ``"current_q@4 kHz"``; see
-        `record_plan`. Empty, with `features`: nothing.
+        What is kept, such as ``"output_position,motor_speed@400 Hz"`` or ``"current_a@every"``; a
+        list of several, too, see `record_plan`. Empty, with `features`: nothing.
     features : str or sequence of str, optional
         Features computed while simulating, such as ``"all@400 Hz"``; see `elevon.features`. They
         stand in ``meta["features"]`` (SI; None where the motion gives none) and their units in

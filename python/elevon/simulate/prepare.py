@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from elevon.actuator import Actuator
 from elevon.errors import ArgumentTypeError, InputError, RangeError, unknown
 from elevon.faults import Fault
 from elevon.features import FeaturePlan, feature_plans
+from elevon.option import Option
 from elevon.parameters import records
 from elevon.parameters.records import wirings
 from elevon.record_plan import MOST_STEPS, ClockPlan, record_plan
@@ -22,7 +23,7 @@ from elevon.scenario.compile import CompiledScenario, signal_units
 from elevon.simulate.acting import Notice, check_values, not_acting
 from elevon.waveforms import TABLE, wave_records
 
-ActuatorLike = Actuator | str | os.PathLike[str]
+ActuatorLike = Annotated[Actuator | str | os.PathLike[str], Option(reads="actuator")]
 ScenarioLike = Scenario | Mapping[str, Any] | str | os.PathLike[str] | None
 
 

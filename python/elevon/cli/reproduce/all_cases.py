@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,24 +14,47 @@ from elevon.cli.groups import UsageError
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 from elevon.cli.reproduce.case import PublishedCase, compute
 from elevon.cli.reproduce.cases import CASES
+from elevon.option import Option
 
 if TYPE_CHECKING:
     from elevon.reproduce.everything import CaseRun
+
+_Folder = Annotated[Path | None, Option(metavar="DIR")]
 
 
 def reproduce_all(
     context: typer.Context,
     *,
-    everything: bool = False,
-    out: Path | None = None,
-    only: list[str] | None = None,
-    data: Path | None = None,
+    everything: Annotated[bool, Option("--all")] = False,
+    out: _Folder = None,
+    only: Annotated[list[str] | None, Option(metavar="CASE")] = None,
+    data: _Folder = None,
     seed: int = 0,
     date: str | None = None,
     force: bool = False,
     as_json: bool = False,
 ) -> int:
-    """Recompute a published table or figure; exit code 1 when a check fails."""
+    """Recompute a published table or figure; exit code 1 when a check fails.
+
+    Parameters
+    ----------
+    everything : bool
+        Every published case, one index.
+    out : path
+        With --all: folder of index and cases.
+    only : list of str
+        With --all: only this one; repeatable.
+    data : path
+        With --all: the foreign data; else not run.
+    seed : int
+        With --all: seed of every random number.
+    date : str
+        With --all: date on the index.
+    force : bool
+        With --all: replace another index.
+    as_json : bool
+        With --all: print one JSON object.
+    """
     case = context.invoked_subcommand
     if case is not None:
         if everything:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 
 from elevon.cli.help import PlainCommand
-from elevon.cli.options import annotated
+from elevon.cli.options import SHARED, annotated
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
-from elevon.data import packaged_toml
+from elevon.option import Option
 from elevon.reproduce.catalogue import Published, published
 
 if TYPE_CHECKING:
     from elevon.report import Report
     from elevon.report.checks import WithChecks
 
+_OUT = Option(metavar="DIR", help="Folder for report.html and the rows as CSV.")
 Options = Mapping[str, Any]
 Values = dict[str, Any]
 
@@ -84,7 +85,7 @@ class PublishedCase:
             }
         if self.seeded:
             common["seed"] = (int, 0)
-        texts = packaged_toml("elevon.cli", "options.toml")["case"]
+        texts = {**SHARED, "out": _OUT}
         shared = {
             name: (annotated(name, kind, texts[name]), default)
             for name, (kind, default) in common.items()
@@ -120,12 +121,14 @@ class PublishedCase:
 
 def _own_option(name: str, entry: Mapping[str, Any]) -> tuple[object, object]:
     """Return annotation and default of an option that a case states itself."""
+    known = {item.name for item in fields(Option)}
+    option = Option(**{key: value for key, value in entry.items() if key in known})
     if "default" in entry:
-        return annotated(name, type(entry["default"]), entry), entry["default"]
+        return annotated(name, type(entry["default"]), option), entry["default"]
     kind = _TYPES[entry["type"]]
     if entry.get("required"):
-        return annotated(name, kind, entry), ...
-    return annotated(name, kind | None, entry), None
+        return annotated(name, kind, option), ...
+    return annotated(name, kind | None, option), None
 
 
 def read_cases(

@@ -1,0 +1,270 @@
+"""`elevon calibrate`, `validate`, `doctor`, `diagnose`, `next-test`: a unit judged by its logs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from elevon.cli import common
+from elevon.cli.output import answer, listed, print_table, say
+from elevon.cli.shell import REPORT, Answer, DoorCall, command, printer
+from elevon.errors import InputError
+from elevon.number_text import estimate_row, quantity_text, severity_texts
+from elevon.option import Option
+
+if TYPE_CHECKING:
+    from elevon.calibrate.outcome import Calibration
+    from elevon.calibrate.validation import Validation
+    from elevon.diagnose.engine.answer import Cause, Diagnosis
+    from elevon.doctor import Examination
+    from elevon.nexttest import NextTest
+    from elevon.prognose.history import NextEntry
+
+_DOCTOR_FILES = ("doctor.html", "doctor.json", "map.toml")
+
+
+@command(
+    None, *REPORT[:3], "date", door="elevon.calibrate.door:calibrate", working="calibrating",
+    without=("promise", "torque_constant"),
+)  # fmt: skip
+def calibrate(
+    door: DoorCall, *, free: list[str] | None = None, out: Path | None = None, force: bool = False
+) -> Answer:
+    """Estimate what the logs determine, with intervals, and write it as a set.
+
+    Parameters
+    ----------
+    free : list of str
+        Parameter path to estimate, repeatable; or auto (the default).
+    out : path
+        Set to write (TOML).
+    """
+    from elevon.calibrate.drops import is_drop_table
+
+    common.check_outputs([out], force=force)
+    if out is not None and out.suffix.lower() != ".toml":
+        raise InputError(f"--out {out}: a set is a TOML file; end the name in .toml")
+    settings, constant = _effort_scale(door.options["settings"])
+    model = common.read_actuator(door.options["actuator"], settings)
+    logs, paths = door.options["logs"], _paths(free)
+    table = {"logs": logs} if len(logs) == 1 and is_drop_table(logs[0]) else {}
+    result: Calibration = door(
+        actuator=model, free=paths, promise=out is not None, torque_constant=constant, **table
+    )
+    if out is not None:
+        say(f"set: {result.write_actuator(out, force=force)}")
+    data = result.to_dict(stored=False) | {"out": None if out is None else str(out)}
+    return Answer(data, lambda: _print_calibration(result), page=result.report)
+
+
+def _effort_scale(settings: list[str] | None) -> tuple[list[str], str | None]:
+    """Take ``motor.torque_constant=VALUE`` out of the settings: the scale of the logs' effort."""
+    head = "motor.torque_constant="
+    given = [text for text in settings or () if text.replace(" ", "").startswith(head)]
+    if len(given) > 1:
+        raise InputError("--set motor.torque_constant is given twice")
+    others = [text for text in settings or () if text not in given]
+    return others, given[0].partition("=")[2].strip() if given else None
+
+
+def _paths(free: list[str] | None) -> list[str] | None:
+    """Split ``--free a,b``; auto or nothing: everything that the logs determine."""
+    names = [name.strip() for text in free or () for name in text.split(",") if name.strip()]
+    if not names or names == ["auto"]:
+        return None
+    if "auto" in names:
+        raise InputError("--free auto stands alone: it frees what the logs can determine")
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"--free {name} is given twice")
+    return names
+
+
+def _print_calibration(result: Calibration) -> None:
+    answer(result.headline)
+    rows = [estimate_row(item, result.before, item.register) for item in result.estimates]
+    columns = ("parameter", "before", "after", "low", "high", "unit", "register", "holds for")
+    print_table(columns, rows, optional=("register",))
+    listed(result.remarks)
+
+
+@printer("elevon.calibrate.door:validate", *REPORT, "date", working="validating")
+def validate(result: Validation) -> None:
+    """Compare the model with logs, signal by signal; exit 1 where a threshold fails."""
+    answer(result.headline)
+    rows = [
+        (
+            e.log,
+            e.signal,
+            quantity_text(e.rms, e.unit, 4)[0],
+            *quantity_text(e.largest, e.unit, 4),
+            f"{e.of_rms:.3g}",
+            f"{e.of_range:.3g}",
+            "" if e.limit is None else f"{e.limit:.3g}",
+            "" if e.passed is None else "pass" if e.passed else "FAIL",
+        )
+        for e in result.errors
+    ]
+    columns = ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", "")
+    print_table(columns, rows)
+    listed([_sensor_text(name, offset) for name, offset in result.offsets.items()])
+    answer(
+        "% of RMS: RMS error over the logged signal's RMS about its mean; "
+        f"% of range: over its range; after {result.transient:g} s"
+    )
+    listed([f"{name}: {text}" for name, text in result.notes.items()])
+
+
+def _sensor_text(name: str, value: float) -> str:
+    """Say in words what a log's sensor adds: an offset, a delay or a filter."""
+    channel, _, kind = name.rpartition("_")
+    if kind == "delay" and channel:
+        return f"{channel}: the log shows it {1e3 * value:.3g} ms late"
+    if kind == "lag" and channel:
+        return f"{channel}: the log shows it behind a filter of {1e3 * value:.3g} ms"
+    return f"{name}: the sensor's offset of {value:.4g} is taken off the logs"
+
+
+@command(
+    None, "strict", "details", "force", door="elevon.doctor.door:doctor", working="looking",
+    without=("loadcells", "notes", "false_alarm"),
+)  # fmt: skip
+def doctor(
+    door: DoorCall,
+    *,
+    loadcell: list[Path] | None = None,
+    command: list[Path] | None = None,
+    out: Annotated[Path | None, Option(metavar="DIR")] = None,
+    force: bool = False,
+) -> Answer:
+    """Look at logs for the first time: columns, data, the model's fit, the verdict.
+
+    Parameters
+    ----------
+    out : path
+        Write page, answer and guessed map into this folder.
+    """
+    if out is not None:
+        common.check_outputs([out / name for name in _DOCTOR_FILES], force=force)
+    paths = common.without_companions(door.options["logs"])
+    result: Examination = door(
+        logs=paths,
+        baselines=common.without_companions(door.options["baselines"] or []),
+        loadcells=common.one_each("--loadcell", loadcell, len(paths)),
+        notes=common.one_each("--command", command, len(paths), shared=True),
+    )
+    if out is not None:
+        for path in result.write(out, force=force):
+            say(f"wrote {path}")
+    return Answer(result, lambda: _print_examination(result, out), 1 if result.failed else 0)
+
+
+def _print_examination(result: Examination, out: Path | None) -> None:
+    answer(result.headline)
+    rows = [(c.log, c.check, "ok" if c.ok else "look", c.text) for c in result.checks]
+    print_table(("log", "data", "", "what was seen"), rows)
+    if result.columns_by == "guess":
+        first = [c for c in result.columns if c.log == result.columns[0].log]
+        columns = [(c.name, c.role or "?", c.unit, c.why) for c in first]
+        print_table(("column", "guessed as", "unit", "why"), columns)
+    if result.fit is not None:
+        fit = [
+            (e.log, e.signal, f"{e.of_range:.3g}", "" if e.limit is None else f"{e.limit:.3g}")
+            for e in result.fit.errors
+        ]
+        print_table(("log", "model beside it", "% of range", "threshold %"), fit)
+    listed([f"no {name}: {text}" for name, text in result.reasons.items()])
+    if out is None:
+        answer("one page of all this: --out DIR")
+
+
+@printer("elevon.nexttest.door:next_test", working="weighing tests", arguments=0)
+def next_test(result: NextTest) -> None:
+    """Propose the bench's test with the largest expected information on what is ambiguous."""
+    answer(result.headline)
+    tests = [
+        (t.name, f"{t.information:.3f}", f"{t.duration:g}", f"{t.rate:.2g}",
+         "yes" if t.standard else "no")
+        for t in result.tests
+    ]  # fmt: skip
+    columns = ("test", "expected [bit]", "takes [s]", "[bit/min]", "healthy log at hand")
+    print_table(columns, tests)
+    possible = result.possible[:10]
+    rows = [(" and ".join(p.faults) or "healthy", f"{p.probability:.3f}") for p in possible]
+    print_table(("still possible", "probability"), rows)
+    listed(result.findings)
+
+
+@command(None, *REPORT, door="elevon.diagnose.door:diagnose")
+def diagnose(
+    door: DoorCall,
+    *,
+    append: Annotated[Path | None, Option(metavar="HISTORY")] = None,
+    usage: Annotated[str | None, Option(metavar="N")] = None,
+    force: bool = False,
+) -> Answer:
+    """Diagnose the unit that wrote the logs, all in one condition.
+
+    Parameters
+    ----------
+    append : path
+        Add the answer to this folder of inspections.
+    usage : str
+        Use at it; the first one as '600 flights'.
+    """
+    rate = door.options["false_alarm"]
+    if not 0.0 < rate < 1.0:
+        raise InputError(f"--false-alarm {rate:g}: must be between 0 and 1")
+    unit = common.read_actuator(door.options["actuator"], door.options["settings"])
+    entry = _next_entry(append, usage, unit.name, force=force)
+    result: Diagnosis = door(actuator=unit)
+    code = 0 if entry is None else _add_to_history(entry, result)
+    return Answer(result, lambda: _print_diagnosis(result), code, page=result.report)
+
+
+def _next_entry(
+    history: Path | None, usage: str | None, actuator: str, *, force: bool
+) -> NextEntry | None:
+    """Return where the answer is added; refused before the work where it cannot be."""
+    from elevon.prognose.history import next_entry
+
+    if history is None and usage is None:
+        return None
+    if history is None or usage is None:
+        raise InputError("--append HISTORY and --usage N go together: a use is that of a history")
+    return next_entry(history, usage, actuator, force=force)
+
+
+def _add_to_history(inspection: NextEntry, result: Diagnosis) -> int:
+    try:
+        say(f"added: {inspection.write(result)}")
+    except InputError as error:
+        say(f"elevon: {error}")
+        return 1
+    return 0
+
+
+def _print_diagnosis(result: Diagnosis) -> None:
+    from elevon.diagnose.engine.words import by_reason, folded, sentence
+
+    answer(result.headline)
+    rows = [
+        (
+            f"{c.kind}@{c.place}",
+            f"{c.probability:.3f}",
+            *_severity_cells(c),
+            ", ".join(folded(c)),
+        )
+        for c in result.faults
+    ]
+    print_table(("cause", "probability", "severity", "low", "high", "ambiguous with"), rows)
+    unseen = [f"not observable: {n}: {reason}" for n, reason in by_reason(result.unobservable)]
+    listed([*result.findings, sentence(result), *unseen])
+
+
+def _severity_cells(cause: Cause) -> tuple[str, str, str]:
+    """A severity with its interval; a class may have none."""
+    if math.isnan(cause.severity):
+        return "-", "-", "-"
+    return severity_texts(cause.severity, cause.interval, cause.unit)
