@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.demo.life.unit import other_law
+from elevon.demo.unit import other_law
 from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.prognose.future import Life, run_to_failure
 from elevon.prognose.law import Law

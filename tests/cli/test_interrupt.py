@@ -73,8 +73,8 @@ HALF = {
         ["validate", "LOG", "--actuator", "torino-rotary", "--report", "OUT/r.html", "--json"],
     ),
     "demo": (
-        "elevon.reproduce.backlash.campaign.reproduce_backlash",
-        ["demo", "--part", "bench", "--out", "OUT/demo", "--json"],
+        "elevon.demo.run.live",
+        ["demo", "--out", "OUT/demo", "--json"],
     ),
     "campaign": (
         "elevon.campaign.execute.simulate_block",

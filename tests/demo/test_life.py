@@ -9,8 +9,8 @@ import pytest
 
 from elevon import Actuator
 from elevon.cli import main
-from elevon.demo.life.mechanism import Motion, mechanism, motion
-from elevon.demo.life.unit import demo_mission, faults_at, hidden_unit, of_day
+from elevon.demo.mechanism import Motion, mechanism, motion
+from elevon.demo.unit import demo_mission, faults_at, hidden_unit, of_day
 from elevon.prognose.future import Life
 
 
@@ -67,9 +67,12 @@ def test_the_pin_stays_within_its_fork():
     assert np.abs(pin - fork).max() == pytest.approx(0.5 * 26.0, abs=0.05)
 
 
-def test_an_unknown_part_is_refused(capsys):
-    assert main(["demo", "--part", "lif"]) == 2
-    assert "life" in capsys.readouterr().err
+@pytest.mark.parametrize("option", ["--part", "--which"])
+def test_the_second_demonstration_is_refused_with_where_its_story_is(option, capsys):
+    assert main(["demo", option, "bench"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "docs/start/tutorial.md" in captured.err
 
 
 def test_what_is_there_is_not_replaced(tmp_path, capsys):

@@ -7,12 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import elevon
 from elevon import Actuator
 from elevon.calibrate.outcome import Calibration
 from elevon.cli import main
-from elevon.demo.life import run as life_run
-from elevon.demo.life.results import Statement
-from elevon.demo.life.unit import demo_mission
+from elevon.demo import run as life_run
+from elevon.demo.run import Statement
+from elevon.demo.unit import demo_mission
 from elevon.plain import plain, read_plain
 from elevon.prognose import ResponseTables
 from elevon.prognose.future import Life
@@ -64,17 +65,17 @@ class Story:
         usage = np.array([0.0, 750.0, 1500.0])
         severity = np.column_stack((1e-5 * usage, 1e-4 * usage))
         replaced = {
-            "elevon.demo.life.run.live": self.step("life", Life(usage, severity, 1500.0, 0)),
-            "elevon.demo.life.run._log": self.log,
+            "elevon.demo.run.live": self.step("life", Life(usage, severity, 1500.0, 0)),
+            "elevon.demo.run._log": self.log,
             "elevon.bench.run.run_procedure": self.bench,
             "elevon.logs.read.read_drive_logs": lambda paths, **_options: paths,
             "elevon.calibrate.calibrate": self.calibrate,
             "elevon.calibrate.write.write_calibration": self.write,
-            "elevon.demo.life.run.respond": self.step("tables", tables()),
+            "elevon.demo.run.respond": self.step("tables", tables()),
             "elevon.diagnose.by_model.diagnose": self.diagnose,
-            "elevon.demo.life.page.life_report": self.step("report", Report("life")),
-            "elevon.demo.life.page.moving_picture": lambda _demo: "<svg/>",
-            "elevon.demo.life.figures.cone_figure": lambda _demo: None,
+            "elevon.demo.page.life_report": self.step("report", Report("life")),
+            "elevon.demo.page.moving_picture": lambda _demo: "<svg/>",
+            "elevon.demo.page.cone_figure": lambda _demo: None,
             "elevon.report.figures.save_figure": lambda *_args, **_options: None,
             "elevon.prognose.predict.prognosis": partial(prognosis, particles=50),
         }
@@ -118,11 +119,11 @@ class Story:
         self.all.append(f"diagnosis {number}")
         return Answer(1e-5 * usage)
 
-    def run(self, out, *, stop=None, fresh=False):
+    def run(self, out, *options, stop=None, fresh=False):
         if fresh:
             self.all = []
         self.stop, self.calls = stop, []
-        return main(["demo", "--out", str(out), "--json"]), self.calls
+        return main(["demo", "--out", str(out), *options, "--json"]), self.calls
 
 
 @pytest.fixture
@@ -189,3 +190,53 @@ def test_other_work_is_refused(story, tmp_path, capsys):
     assert story.calls == []
     assert "other work" in capsys.readouterr().err
     assert Actuator.load("torino-rotary").hash
+
+
+def test_a_complete_page_is_refused_without_force_and_made_anew_with_it(story, tmp_path, capsys):
+    out = tmp_path / "demo"
+    story.run(out, fresh=True)
+    page = (out / "report.html").read_bytes()
+    capsys.readouterr()
+    assert story.run(out) == (2, [])
+    assert "--force" in capsys.readouterr().err
+    _, calls = story.run(out, "--force", stop="calibration")
+    assert calls == ["life", "calibration"]
+    assert (out / "report.html").read_bytes() == page
+    capsys.readouterr()
+    assert story.run(out) == (2, [])
+    assert "report.html" in capsys.readouterr().err
+    story.all = []
+    _, calls = story.run(out, "--force")
+    assert calls[:2] == ["calibration", "tables"]
+    assert calls[-1] == "report"
+
+
+def test_another_version_does_not_go_on(story, tmp_path, monkeypatch):
+    out = tmp_path / "demo"
+    assert story.run(out, stop="calibration", fresh=True)[0] == 130
+    monkeypatch.setattr(elevon, "__version__", "0.0.1", raising=False)
+    assert story.run(out) == (2, [])
+    assert story.run(out, "--force", stop="calibration")[1] == ["life", "calibration"]
+
+
+def test_files_of_someone_else_are_refused_before_any_work(story, tmp_path, capsys):
+    out = tmp_path / "demo"
+    for name in ("logs/sine.csv", "truth.json"):
+        path = out / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("mine")
+        assert story.run(out) == (2, [])
+        assert path.parent.name in capsys.readouterr().err
+        assert path.read_text() == "mine"
+        path.unlink()
+    assert not (out / "unfinished.log").exists()
+
+
+def test_the_library_raises_what_stopped_it(story, tmp_path):
+    story.stop, story.all = "tables", []
+    with pytest.raises(KeyboardInterrupt):
+        life_run.run_life(tmp_path / "demo")
+    story.stop, story.calls = None, []
+    life_run.run_life(tmp_path / "demo")
+    assert story.calls[0] == "tables"
+    assert story.calls[-1] == "report"

@@ -223,7 +223,7 @@ RECIPES = {
                        files={"labels.csv": LABELS}, long=True, points=4),
     "live": Recipe(("torino-rotary", "--fidelity", "low", "--static", "page", "--force"), long=True,
                    points=4),
-    "demo": Recipe(("--part", "bench", "--out", "demo", "--force"), long=True, points=2,
+    "demo": Recipe(("--out", "demo", "--force"), long=True, points=2,
                    code=(0, 1)),
     "reproduce": Recipe(("--all", "--only", "torino-compliance", "--out", "index", "--force"),
                         long=True, points=12),

@@ -1,4 +1,1 @@
-"""The demonstration: a published table, then a bench with hidden values recovered from its logs.
-
-Modules are imported by name; nothing is loaded here.
-"""
+"""The demonstration: a unit lives, is inspected, diagnosed, and its end is predicted."""

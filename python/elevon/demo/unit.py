@@ -13,12 +13,15 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.hidden import hidden_actuator
+from elevon.bench.procedure import Procedure, load_procedure
 from elevon.faults import Fault
 from elevon.prognose import Mission, Process, respond
 from elevon.prognose.future import Life, run_to_failure
 from elevon.prognose.law import Law
 from elevon.progress import Progress
 
+HELD_OUT = "held-out"
+"""Name of the log that is kept from the calibration."""
 INSPECTED = 330.0
 """Flights between inspections, about."""
 FACTORS = (1.35, 0.7)
@@ -28,9 +31,14 @@ _FEEDBACK = 0.5  # greatest relative rise of a truth's growth up to the greatest
 _OWN_HEAT = (0.1, 0.3)  # median and deviation of the logarithm of a unit's over the law's
 
 
+def demo_procedure() -> Procedure:
+    """Return what is done on the bench: three logs to calibrate on, one kept back."""
+    return load_procedure(Path(str(files("elevon.demo") / "bench.toml")))
+
+
 def mission_file() -> Path:
     """Return the file of the demonstration's mission."""
-    return Path(str(files("elevon.demo.life") / "mission.toml"))
+    return Path(str(files("elevon.demo") / "mission.toml"))
 
 
 def demo_mission() -> Mission:

@@ -1,4 +1,4 @@
-"""What an interrupted demonstration leaves for the next one: its finished steps, as JSON.
+"""Steps of the demonstration, timed; an interrupted one leaves the finished ones for the next.
 
 A file ``unfinished.log`` beside the reports names the work; each finished step adds a line with its
 result. The work is told by the package's own files, the seed and both parameter
@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+import time as clock
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 from elevon.actuator import Actuator
 from elevon.errors import FormatError, OutputExistsError
-from elevon.plain import read_plain
+from elevon.plain import Plain, key, plain, read_plain
+from elevon.report.checks import Check, verdict
 from elevon.worklog import WorkLog, digest
 
 Result = TypeVar("Result")
@@ -24,10 +27,7 @@ _CODE = {".py", ".so", ".pyd", ".toml", ".csv", ".j2", ".css", ".js"}
 
 #: Steps that are kept, by the name of their file, and what they are called.
 STEPS = {
-    "backlash": "the backlash table",
     "calibration": "the calibration",
-    "before": "the validation of the published values",
-    "after": "the validation of the calibrated values",
     "life": "the unit's life",
 }
 _INSPECTION = "inspection-"
@@ -131,21 +131,13 @@ class FinishedSteps:
 
 
 def finished_steps(out: Path) -> list[str]:
-    """Name the steps, and the logs, that an unfinished demonstration in a folder has finished."""
-    from elevon.bench.run import state_file
-    from elevon.bench.traces import finished_logs
-    from elevon.demo.procedure import demo_procedure
-
+    """Return the steps that an unfinished demonstration in a folder has finished, in words."""
     log = _read(out / LOG)
     if log is None:
         return []
     steps = [text for name, text in STEPS.items() if name in log.items]
     seen = sum(name.startswith(_INSPECTION) for name in log.items)
-    if seen or "life" in log.items:
-        return [*steps, *([f"{seen} diagnoses"] if seen else [])]
-    procedure = demo_procedure()
-    logs = len(finished_logs(state_file(out / "logs", procedure.name)))
-    return [*steps, *([f"{logs} of {len(procedure.traces)} logs"] if logs else [])]
+    return [*steps, *([f"{seen} diagnoses"] if seen else [])]
 
 
 def inputs_of(files: Iterable[Path], *more: str) -> str:
@@ -159,3 +151,126 @@ def _read(path: Path) -> WorkLog | None:
         return WorkLog.read(path)
     except FormatError:
         return None
+
+
+@dataclass(frozen=True)
+class Step(Plain):
+    """A step of the demonstration.
+
+    Attributes
+    ----------
+    name : str
+        What was done.
+    seconds : float
+        Time it took now.
+    reused : str
+        What of it was kept from an interrupted run; empty where nothing was.
+    """
+
+    COMPUTED = ("resumed",)
+
+    name: str
+    seconds: float
+    reused: Annotated[str, key("kept")] = ""
+
+    @property
+    def resumed(self) -> bool:
+        """Whether some of it was kept."""
+        return bool(self.reused)
+
+
+@dataclass(frozen=True)
+class Work(Generic[Result]):
+    """A step that can be kept: how it is done, and what kind of record it gives.
+
+    Attributes
+    ----------
+    piece : str
+        Its name in the log of finished steps.
+    do : callable
+        Does it.
+    kind : type
+        Of its result: a record, kept as JSON and read back equal.
+    inputs : str
+        What it is made from, in digits.
+    files : sequence of Path
+        What it writes: kept while they are as they were.
+    """
+
+    piece: str
+    do: Callable[[], Result]
+    kind: type[Result]
+    inputs: str = ""
+    files: Sequence[Path] = ()
+
+
+@dataclass
+class Story:
+    """What every demonstration has.
+
+    Attributes
+    ----------
+    seed : int
+        Of the hidden values and of chance.
+    base, hidden : Actuator
+        The published set, and the unit on the bench.
+    folder : Path
+        Of the outputs.
+    finished : FinishedSteps
+        What an interrupted run left, and this one leaves if it is interrupted.
+    steps : list of Step
+        What was done, the seconds it took, and what of it was kept from an interrupted run.
+    """
+
+    seed: int
+    base: Actuator
+    hidden: Actuator
+    folder: Path
+    finished: FinishedSteps
+    steps: list[Step] = field(default_factory=list)
+
+    def timed(
+        self, name: str, work: Callable[[], Result], summary: Callable[[Result], str] | None = None
+    ) -> Result:
+        """Do a step and note its time, and what `summary` says of its result."""
+        begin = clock.perf_counter()
+        result = work()
+        self._note(name, clock.perf_counter() - begin, "" if summary is None else summary(result))
+        return result
+
+    def resumed(self, name: str, work: Work[Result]) -> Result:
+        """Take a step's result from an interrupted run, or do it and keep its result."""
+        begin = clock.perf_counter()
+        stored = self.finished.load(work.piece, work.inputs, work.kind)
+        if stored is not None:
+            result, before = stored
+            text = f"kept from the interrupted run, which took {before:.1f} s for it"
+            self._note(name, clock.perf_counter() - begin, text)
+            return result
+        result = self.timed(name, work.do)
+        seconds = clock.perf_counter() - begin
+        self.finished.save(work.piece, work.inputs, plain(result), seconds, work.files)
+        return result
+
+    def _note(self, name: str, seconds: float, reused: str) -> None:
+        """Add a step; steps of one name are one, with their times added up."""
+        for k, step in enumerate(self.steps):
+            if step.name == name:
+                self.steps[k] = Step(name, step.seconds + seconds, reused or step.reused)
+                return
+        self.steps.append(Step(name, seconds, reused))
+
+    @property
+    def seconds(self) -> float:
+        """Time of all steps so far."""
+        return sum(step.seconds for step in self.steps)
+
+    def summary(self, checks: Sequence[Check]) -> dict[str, Any]:
+        """Return what every demonstration's JSON form has."""
+        return {
+            **verdict(checks),
+            "seed": self.seed,
+            "steps": [step.to_dict() for step in self.steps],
+            "wall_s": self.seconds,
+            "report": str(self.folder / "report.html"),
+        }

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from elevon.actuator import Actuator
-    from elevon.demo.life.results import LifeDemo
+    from elevon.demo.run import LifeDemo
 
 _FRAMES = 100
 _FINER = 20  # samples for each frame
@@ -51,7 +51,7 @@ class Motion:
 
 def motion(demo: LifeDemo, usage: float) -> Motion:
     """Run one sweep of the mission with the hidden unit as it is at a use."""
-    from elevon.demo.life.unit import demo_mission, faults_at
+    from elevon.demo.unit import demo_mission, faults_at
     from elevon.errors import ElevonWarning
     from elevon.simulate import simulate
 

@@ -1,1 +1,0 @@
-"""The demonstration: a unit lives, is inspected, diagnosed, and its end is predicted."""
