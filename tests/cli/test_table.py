@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from elevon.cli.table import table_lines
+from elevon.cli.output import table_lines
 from elevon.number_text import count_text, estimate_texts, interval_texts, severity_texts
 
 HEADS = ["parameter", "before", "after", "low", "high", "unit", "register", "holds for"]

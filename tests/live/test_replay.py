@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.cli.live import _bench
+from elevon.cli.elsewhere import _bench
 from elevon.errors import InputError
 from elevon.live import replay
 from elevon.live.app import Guard

@@ -1,20 +1,29 @@
-"""`elevon export` and `elevon safety`: an actuator for other tools, its control unit's hazards."""
+"""`elevon export`, `safety`, `live` and `demo`: what else an actuator is for."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from elevon.cli import common
+import typer
+
+from elevon.cli import common, interrupt
 from elevon.cli.groups import group
-from elevon.cli.output import answer, print_table, say
-from elevon.cli.shell import Answer, DoorCall, command
+from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.shell import Answer, DoorCall, add_plain, command
+from elevon.errors import InputError
 from elevon.files import write_text
 from elevon.option import Option
 
 if TYPE_CHECKING:
+    from elevon.demo.run import LifeDemo
     from elevon.deploy.document import RunDocument
     from elevon.deploy.fmu import FmuFile
+    from elevon.live.bench import LiveBench
+    from elevon.live.replay import LogReplay
+    from elevon.report.checks import Check
     from elevon.safety.campaign import SafetyResult
 
 export = group("Write an actuator for other tools (docs/how-to/deploy.md).")
@@ -95,3 +104,207 @@ def _print_hazards(values: dict[str, Any]) -> None:
         for item in values["hazards"]
     ]  # fmt: skip
     print_table(["hazard", "rows", "listed", "by one failure", "per hour"], rows, title="hazards")
+
+
+live_bench = typer.Typer(rich_markup_mode=None)
+
+
+@add_plain(live_bench)
+def live(
+    actuator: Annotated[
+        str, Option(metavar="ACTUATOR|FILE", complete="actuators")
+    ] = "torino-rotary",
+    *,
+    fidelity: str = "high",
+    calibrated: Path | None = None,
+    baseline: list[Path] | None = None,
+    mission: Path | None = None,
+    port: Annotated[int, Option(min=0, max=65535)] = 8484,
+    host: str = "127.0.0.1",
+    no_browser: bool = False,
+    factor: Annotated[float, Option(min=0.1, max=100.0)] = 1.0,
+    out: Annotated[Path, Option(metavar="DIR")] = Path(),
+    hide_truth: bool = False,
+    map_: Annotated[Path | None, Option("--map")] = None,
+    model: Annotated[str, Option(metavar="ACTUATOR")] = "torino-rotary",
+    static: Annotated[Path | None, Option(metavar="DIR")] = None,
+    picture: Path | None = None,
+    force: bool = False,
+    seed: int = 0,
+    settings: list[str] | None = None,
+) -> None:
+    """Show an actuator at real time in the browser: move it, break it, watch it being found out.
+
+    Parameters
+    ----------
+    actuator : str
+        Actuator by name or file, or a log or recording to replay.
+    calibrated : path
+        Actuator file, as elevon calibrate writes it.
+    mission : path
+        Mission, for the remaining life.
+    port : int
+        0: a free one.
+    host : str
+        Address to listen on; not loopback: a token is needed.
+    no_browser : bool
+        Open no page.
+    factor : float
+        Simulated over wall time.
+    out : path
+        Where recordings go.
+    hide_truth : bool
+        Tell nobody which faults were set.
+    map_ : path
+        Column map (TOML).
+    model : str
+        Model beside the log that is replayed.
+    static : path
+        Write the page with a recorded session instead.
+    picture : path
+        Write that session as an animated SVG instead.
+    """
+    common.check_outputs([static / "index.html" if static else None, picture], force=force)
+    bench: LiveBench | LogReplay
+    if map_ is not None or _is_log(actuator):
+        bench = _replay(Path(actuator), model, settings, map_, factor)
+    else:
+        bench = _bench(
+            str(calibrated or actuator), settings, fidelity=fidelity, seed=seed, factor=factor,
+            out=out, baselines=baseline or [], mission=mission, hide_truth=hide_truth,
+        )  # fmt: skip
+    if static is not None:
+        _page(bench, static, force=force)
+    elif picture is not None:
+        _picture(bench, picture, force=force)
+    else:
+        _serve(bench, port, host, browser=not no_browser)
+
+
+def _replay(
+    log: Path, model: str, settings: list[str] | None, column_map: Path | None, factor: float
+) -> LogReplay:
+    from elevon.live.replay import LogReplay
+
+    actuator = common.read_actuator(model, settings)
+    return LogReplay.of_file(log, actuator, column_map=column_map, factor=factor)
+
+
+def _page(bench: LiveBench | LogReplay, folder: Path, *, force: bool) -> None:
+    from elevon.live.picture import write_static
+
+    paths = write_static(bench, folder, force=force)
+    sys.stdout.write(f"{len(paths)} files in {folder}\n")
+
+
+def _serve(bench: LiveBench | LogReplay, port: int, host: str, *, browser: bool) -> None:
+    from elevon.live.server import serve
+
+    with interrupt.telling(lambda: _recorded_files(bench)):
+        serve(bench, port=port, host=host, browser=browser, ready=_ready)
+
+
+def _picture(bench: LiveBench | LogReplay, path: Path, *, force: bool) -> None:
+    from elevon.files import write_text
+    from elevon.live.bench import LiveBench
+    from elevon.live.picture import animated_picture
+
+    if not isinstance(bench, LiveBench):
+        raise InputError("--picture: draws a session of an actuator, not of a log")
+    write_text(path, animated_picture(bench), force=force)
+    sys.stdout.write(f"{path}: a session of the live bench\n")
+
+
+def _recorded_files(bench: LiveBench | LogReplay) -> str:
+    names = ", ".join(str(path) for path in bench.files)
+    return f"the bench is closed; recorded: {names or 'nothing'}"
+
+
+def _ready(address: str) -> None:
+    sys.stdout.write(f"live at {address}\n")
+    sys.stdout.flush()
+
+
+def _is_log(given: str) -> bool:
+    return Path(given).suffix.lower() not in ("", ".toml") and Path(given).exists()
+
+
+def _bench(
+    reference: str, settings: list[str] | None, *, fidelity: str, seed: int, factor: float,
+    out: Path, baselines: list[Path], mission: Path | None, hide_truth: bool,
+) -> LiveBench:  # fmt: skip
+    from elevon.live.bench import LiveBench
+    from elevon.live.unit import LiveUnit
+
+    for path in [*baselines, *([mission] if mission else [])]:
+        if not path.expanduser().is_file():
+            raise InputError(f"{path}: no such file")
+    if fidelity not in ("high", "low"):
+        raise InputError(f"--fidelity {fidelity!r}: high or low")
+    unit = LiveUnit(common.read_actuator(reference, settings), fidelity=fidelity, seed=seed)
+    return LiveBench(
+        unit, factor=factor, folder=out, baselines=baselines, mission=mission,
+        hide_truth=hide_truth,
+    )  # fmt: skip
+
+
+@command(None)
+def demo(
+    *,
+    out: Annotated[Path, Option(metavar="DIR")] = Path("out/demo"),
+    seed: int = 0,
+    force: bool = False,
+) -> Answer:
+    """Let a unit live and predict its end from bench logs; one page tells the story.
+
+    Interrupted, it goes on where it was when the same command is given again.
+
+    Parameters
+    ----------
+    out : path
+        Folder for reports and logs.
+    """
+    from elevon.demo.run import run_life
+    from elevon.report.checks import all_passed
+
+    with interrupt.telling(lambda: _finished_text(out)), progress_bar("demo") as advance:
+        result = run_life(out, seed=seed, force=force, progress=advance)
+    code = 0 if all_passed(result.checks) else 1
+    return Answer(result.to_dict(), lambda: _print_life(result), code)
+
+
+def _print_life(result: LifeDemo) -> None:
+    from elevon.demo.page import lead
+
+    answer(lead(result))
+    values = result.to_dict()
+    rows = [
+        (f"{r['usage']:.0f}", " + ".join(r["faults"]) or r["status"], f"{r['rul']:.0f}",
+         f"{r['low']:.0f} to {r['high']:.0f}", f"{r['truth']:.0f}")
+        for r in values["rows"]
+    ]  # fmt: skip
+    print_table(("flights", "diagnosis", "remain", "90 %", "truth"), rows)
+    _print_steps(values["steps"], result.seconds)
+    _print_checks(result.checks)
+    say(f"report: {result.folder / 'report.html'}")
+
+
+def _finished_text(out: Path) -> str:
+    from elevon.demo.story import finished_steps
+
+    done = finished_steps(out.expanduser())
+    if not done:
+        return "no step is finished; give the same command again to start over"
+    return f"kept in {out}: {', '.join(done)}; give the same command again to go on"
+
+
+def _print_steps(steps: Sequence[Mapping[str, Any]], seconds: float) -> None:
+    rows = [(step["name"], f"{step['seconds']:.1f}", step["kept"]) for step in steps]
+    print_table(("step", "s", ""), [*rows, ("all", f"{seconds:.1f}", "")])
+
+
+def _print_checks(checks: Sequence[Check]) -> None:
+    failed = [check for check in checks if not check.passed]
+    answer(f"{len(checks) - len(failed)} of {len(checks)} checks passed")
+    for check in failed:
+        answer(f"failed: {check.name}: {check.value:.4g} {check.unit}, limit {check.limit:.4g}")

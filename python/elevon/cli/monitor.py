@@ -1,26 +1,35 @@
-"""`elevon monitor`: watch a unit's stream, and say soon when a fault begins."""
+"""`elevon monitor`: watch a unit's stream, and say soon when a fault begins.
+
+Of `-` lines of samples come in, and a line a window goes out.
+"""
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import IO, TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from elevon.cli import common
+from elevon.cli import common, interrupt
 from elevon.cli.output import answer, listed, print_json, say
 from elevon.cli.shell import add_plain
 from elevon.errors import InputError
 from elevon.files import check_output
 from elevon.number_text import severity_texts
 from elevon.option import Option
+from elevon.plain import fields_of, plain
+from elevon.results import finite
 from elevon.units import parse_quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from elevon.actuator import Actuator
-    from elevon.diagnose.monitor import Monitor, Monitoring
+    from elevon.diagnose.monitor import Monitor, Monitoring, MonitorStep
     from elevon.logs.log import Log
+    from elevon.logs.stream import StreamPart, StreamReader
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -77,7 +86,7 @@ def monitor(
     unit = common.read_actuator(actuator, settings)
     if Path("-") in logs:
         _check_stream(logs, loadcell, command, json=json)
-        _watch(_monitor(unit, healthy, options, command), healthy, column_map, state)
+        _watch_input(_monitor(unit, healthy, options, command), healthy, column_map, state)
     elif state is not None:
         raise InputError("--state: serves a stream; give - as the log")
     else:
@@ -131,8 +140,9 @@ def _monitor(
     return Monitor(unit, healthy, note=note, **given)
 
 
-def _watch(watch: Monitor, healthy: list[Log], column_map: Path | None, state: Path | None) -> None:
-    from elevon.cli.monitor_stream import known_factors, watch_stream
+def _watch_input(
+    watch: Monitor, healthy: list[Log], column_map: Path | None, state: Path | None
+) -> None:
     from elevon.logs.maps.column_map import find_map
     from elevon.logs.stream import StreamReader
 
@@ -157,3 +167,116 @@ def _print(result: Monitoring) -> None:
     reasons = [step.skipped for step in result.steps if step.skipped]
     listed([f"{reasons.count(why)} windows left out: {why}" for why in sorted(set(reasons))])
     listed(result.findings)
+
+
+_PORTION = 65536  # bytes
+
+
+def known_factors(baselines: Sequence[Log]) -> dict[str, float]:
+    """Return the factors that the import of baselines settled, by column."""
+    out: dict[str, float] = {}
+    for log in baselines:
+        report: Any = {} if log.recording is None else log.recording.meta.get("import") or {}
+        for item in report.get("channels", ()):
+            if item.get("factor") is not None:
+                out[item["column"]] = item["factor"]
+    return out
+
+
+def watch_stream(
+    source: IO[bytes], reader: StreamReader, watch: Monitor, state: Path | None
+) -> None:
+    """Watch a stream to its end; write a line for each window, flushed, and a last one.
+
+    Raises
+    ------
+    InputError
+        Lines that are no stream of samples; no window that could be used, without a state.
+    """
+    if state is not None and state.exists():
+        watch.resume(state)
+        reader.go_on(watch.heading)
+        say(f"goes on from {state}, behind the sample of {watch.latest} s")
+    story = "nothing was written" if state is None else f"{state} holds where the stream stands"
+    with interrupt.telling(lambda: story):
+        try:
+            for part in _parts(source, reader):
+                with interrupt.postpone():  # a state is of a whole number of lines
+                    if _take(part, reader, watch):
+                        _save(watch, state)
+            _write(watch.finish(), watch)
+        finally:
+            _save(watch, state)
+    if state is None and not watch.windows:
+        raise InputError(f"no window of {watch.width:g} s could be used: {_why(watch, reader)}")
+    _end(watch, reader)
+
+
+def _parts(source: IO[bytes], reader: StreamReader) -> Iterator[StreamPart]:
+    """Yield what comes, as it comes."""
+    read = getattr(source, "read1", source.read)
+    while data := read(_PORTION):
+        yield from reader.read(data)
+
+
+def _take(part: StreamPart, reader: StreamReader, watch: Monitor) -> bool:
+    """Feed what some lines say; return whether a window became whole."""
+    watch.heading = reader.heading
+    for text in part.notes:
+        say(text)
+    if part.unreadable:
+        watch.leave_out(part.unreadable)
+        say(f"{part.why}; {part.unreadable} lines left out")
+    steps = watch.feed(part.samples) if len(part.samples["time"]) else []
+    _write(steps, watch)
+    if part.new_day:
+        last = watch.finish()
+        _write(last, watch)
+        watch.new_day()
+        return True
+    return bool(steps)
+
+
+def _why(watch: Monitor, reader: StreamReader) -> str:
+    """What came instead of a window."""
+    reasons = list(watch.skipped)
+    if watch.latest is not None:
+        reasons.append(f"the day's samples span {watch.latest - (watch.origin or 0.0):g} s")
+    counts = {n.replace("_", " "): k for n, k in watch.samples.to_dict().items() if k}
+    reasons += [f"samples {name}: {count}" for name, count in counts.items()]
+    if reader.cut_off:
+        reasons.append(f"the stream ends in mid-line, {reader.cut_off} bytes behind its last one")
+    return "; ".join(reasons) or "no sample came"
+
+
+def _save(watch: Monitor, state: Path | None) -> None:
+    if state is not None:
+        watch.save(state)
+
+
+def _write(steps: Sequence[MonitorStep], watch: Monitor) -> None:
+    for step in steps:
+        line = {"event": "window", "day_began": watch.origin} | step.to_dict()
+        if watch.alarm is not None and (watch.alarm.log, watch.alarm.time) == (step.log, step.end):
+            line["first_alarm"] = watch.alarm.to_dict()
+        _line(line)
+
+
+def _end(watch: Monitor, reader: StreamReader) -> None:
+    result = watch.result()
+    if reader.cut_off:
+        say(f"the stream ends in mid-line: its last {reader.cut_off} bytes are left out")
+    _line(
+        {
+            "event": "end",
+            "ended": "in mid-line" if reader.cut_off else "whole",
+            "bytes_left_out": reader.cut_off,
+            **fields_of(result, "status", "findings"),
+            **fields_of(watch, "windows", "skipped", "samples", "top", "alarm"),
+        }
+    )
+
+
+def _line(data: dict[str, Any]) -> None:
+    sys.stdout.write(json.dumps(finite(plain(data)), allow_nan=False) + "\n")
+    sys.stdout.flush()

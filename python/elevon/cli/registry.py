@@ -54,9 +54,10 @@ _MODULES = {
     "actuators": ("list:listing", "show", "new", "check"),
     "simulating": ("simulate", "compare", "response", "fit-low", "loads", "design"),
     "recordings": ("import:import_", "plot", "features"),
-    "judging": ("doctor", "calibrate", "validate", "diagnose", "next-test"),
+    "judging": ("doctor", "calibrate", "validate", "diagnose", "learn", "next-test"),
+    "campaign": ("campaign:app", "dataset:datasets"),
     "lives": ("predict", "next-inspection", "fleet"),
-    "elsewhere": ("export", "safety"),
+    "elsewhere": ("export", "safety", "live:live_bench", "demo"),
 }
 
 
