@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import wraps
 from pathlib import Path
 
 import pytest
@@ -69,7 +70,13 @@ def test_csv_of_several_clocks_is_checked_before_simulating(elevon_cli, tmp_path
     assert set(elevon.Recording.load(tmp_path / "run.csv").names) == {"motor_speed", "current_q"}
     for path in tmp_path.glob("run.at_400_hz*"):
         path.unlink()
-    monkeypatch.setattr(sys.modules["elevon.simulate"], "simulate", None)  # calling it fails
+    module = sys.modules["elevon.simulate"]
+
+    @wraps(module.simulate)  # its signature gives the command its options; calling it fails
+    def never(*_args, **_options):
+        raise AssertionError("simulated")
+
+    monkeypatch.setattr(module, "simulate", never)
     result = elevon_cli(*arguments, "--out", tmp_path / "run.csv")
     assert result.code == 2
     assert "run.at_1000_hz.csv: exists already" in result.err
