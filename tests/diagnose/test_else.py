@@ -9,19 +9,16 @@ import pytest
 
 from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.answer import Reason
-from elevon.diagnose.engine.candidates import CANDIDATES
-from elevon.diagnose.engine.case import LogCase, detector_of
-from elevon.diagnose.engine.detection import Detector
+from elevon.diagnose.engine.candidates import CANDIDATES, not_modelled
+from elevon.diagnose.engine.case import Detector, LogCase, detector_of
 from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.diagnose.engine.explain import refuting
-from elevon.diagnose.engine.frame import Frame
 from elevon.diagnose.engine.healthy import healthy
-from elevon.diagnose.engine.likelihood import _somewhere
+from elevon.diagnose.engine.likelihood import Frame, _somewhere
 from elevon.diagnose.engine.lookalikes import SHARE
-from elevon.diagnose.engine.not_modelled import not_modelled
+from elevon.diagnose.engine.page import sentence
 from elevon.diagnose.engine.replay import Replay
 from elevon.diagnose.engine.table import FeatureVector
-from elevon.diagnose.engine.words import sentence
 from elevon.diagnose.positions.features import FEATURES
 from elevon.diagnose.positions.reading import BRAKE_UNKNOWN
 from elevon.errors import InputError

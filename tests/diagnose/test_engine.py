@@ -9,8 +9,7 @@ import elevon
 from elevon import Actuator
 from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.candidates import CANDIDATES, chosen
-from elevon.diagnose.engine.case import case_of, detector_of
-from elevon.diagnose.engine.detection import Detector
+from elevon.diagnose.engine.case import Detector, case_of, detector_of
 from elevon.diagnose.engine.posterior import marginals, posterior, quantiles
 from elevon.diagnose.engine.replay import _RECENT, replay
 from elevon.diagnose.positions.log import LONGEST, _first_part

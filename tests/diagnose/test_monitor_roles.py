@@ -8,8 +8,7 @@ import pytest
 from elevon import Actuator, Scenario, simulate
 from elevon.diagnose.engine.days import drawn
 from elevon.diagnose.monitor import Monitor
-from elevon.diagnose.monitor.by_command import ActionCutter
-from elevon.diagnose.monitor.repetition import period_of
+from elevon.diagnose.monitor.by_roles import ActionCutter, period_of
 from elevon.errors import InputError
 from elevon.live.trace import LiveMotion, StreamWatch
 from elevon.logs.log import Log

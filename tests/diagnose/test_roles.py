@@ -13,10 +13,9 @@ from elevon.diagnose.engine.case import case_of
 from elevon.diagnose.engine.days import drawn, factors_of
 from elevon.diagnose.engine.likelihood import _around
 from elevon.diagnose.engine.replay import _RECENT, _severities, spread_of
-from elevon.diagnose.roles.load import load_alike, read_load
 from elevon.diagnose.roles.log import _onset, role_log
-from elevon.diagnose.roles.numbers import numbers_of
-from elevon.diagnose.roles.series import lines
+from elevon.diagnose.roles.numbers import lines, numbers_of
+from elevon.diagnose.roles.reading import load_alike, read_load
 from elevon.errors import InputError, UnknownNameError
 from elevon.logs.log import Log
 from studies.fault_limits.standard import Day, day_logs, diagnosed, standard_tests

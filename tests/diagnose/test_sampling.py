@@ -6,8 +6,7 @@ import pytest
 from elevon import Actuator
 from elevon.diagnose.engine.candidates import CANDIDATES
 from elevon.diagnose.engine.case import case_of
-from elevon.diagnose.engine.frame import Frame
-from elevon.diagnose.engine.likelihood import one_fault, prior_density, two_faults
+from elevon.diagnose.engine.likelihood import Frame, one_fault, prior_density, two_faults
 from elevon.diagnose.engine.posterior import quantiles
 from elevon.diagnose.positions.reading import PositionReading
 from tests.diagnose.virtual import bench_logs

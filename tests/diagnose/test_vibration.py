@@ -12,7 +12,7 @@ from elevon.bench.procedure import load_procedure
 from elevon.bench.stand import stand_of
 from elevon.diagnose.door import diagnose
 from elevon.diagnose.vibration import answer
-from elevon.diagnose.vibration.reading import PassReading, shows_passes
+from elevon.diagnose.vibration.answer import PassReading, shows_passes
 from elevon.features.envelope import ball_passes, envelope_orders
 from elevon.logs.log import Log
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from elevon.diagnose.engine.answer import Cause, Diagnosis, FaultPlace, Reason
-from elevon.diagnose.engine.words import folded, sentence, severity_text, verdict
+from elevon.diagnose.engine.page import folded, sentence, severity_text, verdict
 
 
 @pytest.mark.parametrize(

@@ -247,7 +247,7 @@ def _add_to_history(inspection: NextEntry, result: Diagnosis) -> int:
 
 
 def _print_diagnosis(result: Diagnosis) -> None:
-    from elevon.diagnose.engine.words import by_reason, folded, sentence
+    from elevon.diagnose.engine.page import by_reason, folded, sentence
 
     answer(result.headline)
     rows = [

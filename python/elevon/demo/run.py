@@ -69,7 +69,7 @@ class Statement:
     @classmethod
     def of(cls, answer: Diagnosis) -> Statement:
         """Take it from the whole answer."""
-        from elevon.diagnose.engine.words import sentence
+        from elevon.diagnose.engine.page import sentence
 
         return cls(answer.to_dict(), sentence(answer))
 

@@ -20,8 +20,8 @@ from elevon.calibrate.ways import turns
 from elevon.diagnose.by_model import reading_of
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase
-from elevon.diagnose.engine.frame import Frame
 from elevon.diagnose.engine.healthy import healthy
+from elevon.diagnose.engine.likelihood import Frame
 from elevon.diagnose.engine.replay import replay
 from elevon.logs.log import Log
 from elevon.nexttest.belief import Belief, Possible

@@ -241,7 +241,7 @@ class Diagnosis(Result):
     @property
     def headline(self) -> str:
         """The answer in one line."""
-        from elevon.diagnose.engine.words import verdict
+        from elevon.diagnose.engine.page import verdict
 
         return verdict(self)
 

@@ -11,6 +11,7 @@ import numpy as np
 from elevon.diagnose.engine.answer import SEEN, Diagnosis, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import (
+    Detector,
     LogCase,
     allowed,
     detector_of,
@@ -20,7 +21,6 @@ from elevon.diagnose.engine.case import (
     shift_of,
     uncertainty_of,
 )
-from elevon.diagnose.engine.detection import Detector
 from elevon.diagnose.engine.explain import (
     NO_CANDIDATE,
     alternatives,

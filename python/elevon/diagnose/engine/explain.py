@@ -26,7 +26,7 @@ from elevon.diagnose.engine.case import (
     shift_of,
     uncertainty_of,
 )
-from elevon.diagnose.engine.frame import stray_of
+from elevon.diagnose.engine.likelihood import stray_of
 from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
 
 LISTED = 0.02  # probability below which a cause is not listed

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.draws import normal
 from elevon.diagnose.engine.replay import Replay
-from elevon.diagnose.engine.spread import LearnedSpread, StepVariance, stated, variances
+from elevon.diagnose.engine.spread import LearnedSpread, StepVariance, normal, stated, variances
 from elevon.diagnose.engine.table import Feature, FeatureVector, deviations
 
 _FAR = 2.0  # deviations

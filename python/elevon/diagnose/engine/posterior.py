@@ -16,8 +16,8 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import CandidateFault
-from elevon.diagnose.engine.frame import Frame
 from elevon.diagnose.engine.likelihood import (
+    Frame,
     Hypothesis,
     healthy_alone,
     one_fault,

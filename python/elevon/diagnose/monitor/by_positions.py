@@ -12,8 +12,7 @@ from elevon.diagnose.engine.replay import Replay, replay
 from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.monitor.cutter import CutWindow, WindowCutter
 from elevon.diagnose.monitor.windows import NO_MOTION, OTHER, Day, Windows, apart, stretch, usable
-from elevon.diagnose.positions.command import noted_command
-from elevon.diagnose.positions.log import RUN_IN
+from elevon.diagnose.positions.log import RUN_IN, noted_command
 from elevon.diagnose.positions.reading import PositionReading, logged_features
 from elevon.errors import InputError
 from elevon.logs.drive import drive_channels, drive_log

@@ -17,18 +17,22 @@ import numpy.typing as npt
 from elevon.arrays import Floats
 from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.candidates import chosen
-from elevon.diagnose.monitor.answer import Alarm, Monitoring, MonitorStep
+from elevon.diagnose.monitor.answer import (
+    Alarm,
+    Monitoring,
+    MonitorState,
+    MonitorStep,
+    digest_of,
+    read_state,
+    write_state,
+)
 from elevon.diagnose.monitor.by_positions import PositionWindows
 from elevon.diagnose.monitor.by_roles import RoleWindows
-from elevon.diagnose.monitor.cause import likely_causes
 from elevon.diagnose.monitor.cutter import CutWindow, DayPlace, SampleCounts, WindowCutter
 from elevon.diagnose.monitor.filter import ChangeFilter
-from elevon.diagnose.monitor.reference import WindowReference, reference
-from elevon.diagnose.monitor.samples import by_role
-from elevon.diagnose.monitor.settle import MOST, AlarmCause
-from elevon.diagnose.monitor.state import MonitorState, digest_of, read_state, write_state
-from elevon.diagnose.monitor.threshold import for_days
-from elevon.diagnose.monitor.windows import Day, Windows
+from elevon.diagnose.monitor.reference import WindowReference, likely_causes, reference
+from elevon.diagnose.monitor.threshold import MOST, AlarmCause, for_days
+from elevon.diagnose.monitor.windows import Day, Windows, by_role
 from elevon.errors import InputError
 from elevon.logs.brake import Brake
 

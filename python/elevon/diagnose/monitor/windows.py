@@ -6,23 +6,27 @@ A turning servo's windows are read by its positions, any other actuator's by the
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.table import FeatureVector
 from elevon.diagnose.monitor.cutter import CutWindow, WindowCutter
+from elevon.errors import InputError, unknown
 from elevon.logs.brake import Brake
 from elevon.logs.log import Log
+from elevon.logs.maps.column_map import known_roles, known_signals
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.diagnose.engine.candidates import CandidateFault
     from elevon.diagnose.engine.replay import Replay
     from elevon.logs.command.note import CommandNote
+
 
 COUNTS = "good"  # a channel of ours: NaN where a sample of a log does not count
 SAME = 0.2  # relative difference of motion up to which a window is of the baselines' motion
@@ -169,3 +173,60 @@ def usable(window: CutWindow, least: int) -> bool:
 def apart(a: Sequence[float], b: Sequence[float]) -> bool:
     """Whether two motions differ in one of their numbers."""
     return any(abs(x - y) > SAME * max(abs(x), abs(y)) for x, y in zip(a, b, strict=True))
+
+
+LATEST = 1e12  # s: a time stamp beyond that is none
+
+
+def by_role(
+    samples: Mapping[str, npt.ArrayLike], read: Collection[str]
+) -> tuple[Floats, dict[str, Floats]]:
+    """Return time stamps, shape (n,), and channels by role, of samples by role or signal.
+
+    Signals whose role is not among those that are read are left out.
+
+    Raises
+    ------
+    InputError
+        No time or none that is finite, a name that is neither, two channels with one role, no
+        numbers, lengths that differ.
+    """
+    out: dict[str, Floats] = {}
+    for name, values in samples.items():
+        role = _role(name, read)
+        if role in out:
+            raise InputError(f"stream: {name!r} has the role {role}, and so has another channel")
+        if role:
+            out[role] = _column(name, values)
+    if "time" not in out:
+        raise InputError("stream: 'time' is missing")
+    time = out.pop("time")
+    odd = {role: len(values) for role, values in out.items() if len(values) != len(time)}
+    if odd:
+        role, count = odd.popitem()
+        raise InputError(f"stream: {len(time)} time stamps, {count} values of {role}")
+    if not (np.abs(time) <= LATEST).all():
+        wrong = time[~(np.abs(time) <= LATEST)][0]
+        raise InputError(f"stream: time stamp {wrong:g} s: must be finite, at most {LATEST:g} s")
+    return time, out
+
+
+def _role(name: str, read: Collection[str]) -> str:
+    """Return the role of a name; empty of a signal that nothing here reads."""
+    if name in read or name in known_roles():
+        return name
+    signals = known_signals()
+    if name not in signals:
+        raise unknown("channel", name, [*known_roles(), *signals], "stream")
+    role = signals[name].role
+    return role if role in read else ""
+
+
+def _column(name: str, values: npt.ArrayLike) -> Floats:
+    try:
+        column = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"stream: {name}: no numbers: {error}") from error
+    if column.ndim != 1:
+        raise InputError(f"stream: {name} has the shape {column.shape}; one value a sample")
+    return np.where(np.isfinite(column), column, np.nan)

@@ -20,8 +20,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import Cause, Diagnosis, FaultPlace
-from elevon.diagnose.positions.features import regress
-from elevon.diagnose.positions.lost_motion import carried
+from elevon.diagnose.positions.features import carried, regress
 from elevon.diagnose.stand_sensors import PROBABILITY, contradiction
 from elevon.logs.log import bridged
 

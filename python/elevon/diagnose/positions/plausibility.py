@@ -21,12 +21,12 @@ from elevon.diagnose.positions.features import (
     SLOW,
     SMOOTH,
     Bools,
+    carried,
     local_mean,
     local_slope,
     median,
     regress,
 )
-from elevon.diagnose.positions.lost_motion import carried
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator

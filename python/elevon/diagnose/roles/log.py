@@ -10,9 +10,8 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import of_a_magnet
-from elevon.diagnose.roles.load import read_load
-from elevon.diagnose.roles.reading import BEFORE, INPUTS, RoleReading
-from elevon.diagnose.roles.series import lines
+from elevon.diagnose.roles.numbers import lines
+from elevon.diagnose.roles.reading import BEFORE, INPUTS, RoleReading, read_load
 from elevon.errors import InputError
 from elevon.logs.log import Log, bridged, on_clock
 

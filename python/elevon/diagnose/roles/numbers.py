@@ -8,16 +8,198 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.table import Feature, FeatureTable
-from elevon.diagnose.roles.catalogue import catalogue_values
-from elevon.diagnose.roles.series import noise_deviation
-from elevon.diagnose.roles.slopes import Slope, slopes
+
+if TYPE_CHECKING:
+    from elevon.features.records import FeatureRecord
+
+
+_OVER = 4  # samples of the model to one of the log, which are averaged: loggers filter, too
+_NORMAL = 1.4826  # deviation over the median of the size, of Gaussian noise
+
+
+def smoothed(values: Floats, width: int) -> Floats:
+    """Return the means over `width` samples about each, mirrored at the ends."""
+    padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="reflect")
+    return np.convolve(padded, np.ones(width) / width, "valid")
+
+
+def noise_deviation(values: Floats) -> float:
+    """Return the deviation of what changes from sample to sample, by second differences."""
+    return float(_NORMAL * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0))
+
+
+def lines(time: Floats, values: Floats, most: float) -> tuple[Floats, Floats]:
+    """Return straight lines that miss no sample by more than `most` (Douglas and Peucker)."""
+    corners = {0, len(time) - 1}
+    open_parts = [(0, len(time) - 1)]
+    while open_parts:
+        first, last = open_parts.pop()
+        if last - first < 2:
+            continue
+        inner = slice(first + 1, last)
+        line = np.interp(time[inner], time[[first, last]], values[[first, last]])
+        off = np.abs(values[inner] - line)
+        worst = int(np.argmax(off))
+        if off[worst] > most:
+            middle = first + 1 + worst
+            corners.add(middle)
+            open_parts += [(first, middle), (middle, last)]
+    at = np.array(sorted(corners))
+    return time[at], values[at]
+
+
+def averaged(values: Floats, over: int) -> Floats:
+    """Return the means over `over` steps, an even number, about each sample but the ends."""
+    if over == 1 or len(values) < 2 * over:
+        return values
+    half = over // 2
+    total = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))))
+    out = values.copy()
+    out[half:-half] = (total[over:] - total[:-over]) / over
+    return out
+
+
+def oversampling(rate: float, step: float) -> int:
+    """Samples of the model to one of a log, an even number as far as its steps allow it."""
+    steps = round(1.0 / (rate * step))
+    return next((n for n in (_OVER, 2) if steps % n == 0), 1)
+
+
+_FAMILIES = ("level", "friction", "transmission", "orders", "bands")
+#: What levels say already, and what a single moment decides.
+_LEFT_OUT = ("mean", "kurtosis", "peak", "moving")
+_AGAIN = 16  # times that they are read with noise added
+
+
+class CatalogueValue(NamedTuple):
+    """A feature of a log, and its deviation by the channels' noise."""
+
+    record: FeatureRecord
+    value: float
+    noise: float
+
+
+def catalogue_values(
+    channels: Mapping[str, Floats],
+    rate: float,
+    pole_pairs: float | None,
+    noise: Mapping[str, float],
+) -> list[CatalogueValue]:
+    """Return the features.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray, shape (n,)
+        Role to values; no states.
+    rate : float
+        Of the log [Hz].
+    pole_pairs : float or None
+        Of the motor, for orders of the electrical turn.
+    noise : mapping of str to float
+        Role to the deviation of its noise; none: it is not asked for.
+    """
+    from elevon import _core
+    from elevon.features.plan import core_plan
+    from elevon.features.records import wanted_records
+
+    every = wanted_records(["all"], {r: r for r in channels}, rate, "features")[0]
+    records = [
+        r
+        for r in every
+        if r.family in _FAMILIES
+        and not any(word in r.name.split("_") for word in _LEFT_OUT)
+        and not (r.name.endswith("_rms") and not r.name.startswith("tracking"))
+        and ("electrical" not in r.name or pole_pairs is not None)
+    ]
+    roles = sorted({role for r in records for role in r.roles})
+    if not records:
+        return []
+    plan = core_plan([r.name for r in records], roles, rate=rate, pole_pairs=pole_pairs or 1.0)
+
+    def read(columns: list[Floats]) -> Floats:
+        return np.asarray(_core.features(plan, columns), dtype=np.float64)
+
+    columns = [np.ascontiguousarray(channels[role]) for role in roles]
+    values, deviations = read(columns), np.zeros(len(records))
+    if noise:  # orders and bands know no sum of their noise: the log with as much noise again
+        rng, sizes = np.random.default_rng(15), [noise.get(role, 0.0) for role in roles]
+        more = [[s * rng.standard_normal(len(columns[0])) for s in sizes] for _ in range(_AGAIN)]
+        rows = [read([x + n for x, n in zip(columns, each, strict=True)]) for each in more]
+        deviations = np.std(np.where(np.isfinite(rows), rows, values), axis=0, ddof=1)
+    rows_of = zip(records, values.tolist(), deviations.tolist(), strict=True)
+    return [CatalogueValue(*row) for row in rows_of]
+
+
+_APART = 0.4  # of a regressor that those before it do not make up
+_BLOCKS = 12  # of a log, whose residuals count as independent of each other
+
+
+class Slope(NamedTuple):
+    """One slope.
+
+    Attributes
+    ----------
+    value : float
+        By least squares.
+    size : float
+        What it would be if y were of this column alone.
+    noise : float
+        Its deviation by what of the residual changes from sample to sample.
+    misfit : float
+        Its deviation by the residual as it stands, correlated within blocks of the log: a column
+        that moves little on a day leaves its slope to what the columns do not explain.
+    """
+
+    value: float
+    size: float
+    noise: float = 0.0
+    misfit: float = 0.0
+
+
+def slopes(y: Floats, columns: Mapping[str, Floats], *, doubted: bool = False) -> dict[str, Slope]:
+    """Return slopes of y, shape (n,), by least squares; with their deviations where `doubted`.
+
+    Columns count in their order: one that those before it nearly make up is left out, since its
+    slope would be chance.
+    """
+    names: list[str] = []
+    basis: list[Floats] = []
+    for name, x in columns.items():
+        residual = x - sum((q * float(q @ x) for q in basis), np.zeros(len(x)))
+        size = float(np.linalg.norm(residual))
+        if size > _APART * float(np.linalg.norm(x)):
+            names.append(name)
+            basis.append(residual / size)
+    if not names or len(y) < 4 * (len(names) + 1):
+        return {}
+    design = np.column_stack([columns[n] for n in names])
+    norms = np.sqrt(np.mean(design**2, axis=0))
+    scaled = design / norms
+    values = np.linalg.lstsq(scaled, y, rcond=None)[0]
+    errors = _errors(scaled, y - scaled @ values) if doubted else np.zeros((len(names), 2))
+    sizes = float(np.sqrt(np.mean(y**2))) / norms
+    rows = np.column_stack([values / norms, sizes, errors / norms[:, None]]).tolist()
+    return {name: Slope(*row) for name, row in zip(names, rows, strict=True)}
+
+
+def _errors(design: Floats, residual: Floats) -> Floats:
+    """Deviations of slopes by noise, and by residuals correlated within blocks, shape (k, 2).
+
+    The second is the covariance of a regression with clustered residuals (Liang and Zeger, 1986).
+    """
+    inverse = np.linalg.pinv(design.T @ design)
+    noise = noise_deviation(residual) * np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    blocks = np.array_split(np.arange(len(residual)), _BLOCKS)
+    pulls = np.array([residual[b] @ design[b] for b in blocks]) @ inverse
+    return np.column_stack([noise, np.sqrt(np.sum(pulls**2, axis=0))])
+
 
 _SLOW = 100.0  # Hz of the means that levels and regressions are made of
 _PARTS = 6  # of a motion one way: what happens when
