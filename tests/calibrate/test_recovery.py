@@ -7,7 +7,7 @@ import pytest
 
 from elevon import Actuator, Scenario
 from elevon.calibrate import calibrate, read_logs
-from elevon.calibrate.heldout import HeldOut
+from elevon.calibrate.calibration import HeldOut
 from elevon.errors import InputError
 from elevon.simulate import simulate
 from tests.calibrate.bench import CASES, COUNT, make_truth, write_logs

@@ -10,7 +10,7 @@ from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs
 from elevon.calibrate.candidates import candidates
 from elevon.calibrate.door import _refused
-from elevon.calibrate.identify import SensitivityTable, choose
+from elevon.calibrate.dynamic import SensitivityTable, choose
 from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.speed_runs import SpeedRuns
 from elevon.cli.runner import run

@@ -3,9 +3,9 @@
 import pytest
 
 from elevon import Actuator
+from elevon.calibrate.calibration import DRIVE_STAGES
 from elevon.calibrate.stages import STAGES
 from elevon.calibrate.stages.context import Context, Stage, run_stages
-from elevon.calibrate.stages.signals import DRIVE_STAGES
 from elevon.errors import InputError, Interrupted
 from elevon.estimate import Estimate
 from elevon.parameters.records import records, wiring_names

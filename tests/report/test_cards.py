@@ -85,7 +85,7 @@ def test_a_sparkline_keeps_its_extremes_and_its_gaps():
 
 
 def test_a_calibration_shows_its_intervals_and_what_it_cannot_tell():
-    from elevon.calibrate.notebook_card import calibration_card
+    from elevon.calibrate.outcome import calibration_card
     from elevon.estimate import Estimate
 
     actuator = elevon.Actuator.load("torino-rotary")

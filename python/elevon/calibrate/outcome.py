@@ -13,7 +13,9 @@ from elevon.arrays import Floats
 from elevon.calibrate.validation import Validation
 from elevon.errors import unknown
 from elevon.estimate import Estimate
+from elevon.number_text import estimate_row
 from elevon.plain import REMAINDER, STORED, Plain, in_unit, key, plain
+from elevon.report.cards import Html, badge, card, table
 from elevon.results import Result
 
 if TYPE_CHECKING:
@@ -139,8 +141,6 @@ class Calibration(Result):
         return [*texts, *self.findings]
 
     def _repr_html_(self) -> str:
-        from elevon.calibrate.notebook_card import calibration_card
-
         names = [log.name for log in self.logs]
         return calibration_card(self.before, names, self.estimates, self.undetermined)
 
@@ -191,3 +191,19 @@ def log_facts(logs: Sequence[_Log], **more: Mapping[str, object]) -> tuple[LogFa
         )
         for log in logs
     )
+
+
+def calibration_card(
+    before: Actuator,
+    logs: Sequence[str],
+    estimates: Sequence[Estimate],
+    undetermined: Mapping[str, str],
+) -> Html:
+    """Return the HTML view: each number with its interval, then what the logs cannot tell."""
+    rows = [estimate_row(item, before) for item in estimates]
+    head = ["parameter", "before", "after", "low", "high", "unit", "holds for"]
+    facts = [("", badge("ok")), ("from", ", ".join(logs)), ("intervals of", "90 %")]
+    parts = [table(head, rows)]
+    if undetermined:
+        parts.append(table(["not determined", "reason"], undetermined.items()))
+    return card(f"Calibration of {before.name}", facts, *parts)

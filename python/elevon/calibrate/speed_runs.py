@@ -14,7 +14,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.calibrate.model_runs import ModelRuns
 from elevon.experiment import Experiment, Inputs, Sensor, Variant
-from elevon.experiment.inputs import Table
+from elevon.experiment.experiment import Table
 from elevon.logs.log import Log
 from elevon.parameters.relations import torque_constant
 from elevon.simulate.prepare import solver_step

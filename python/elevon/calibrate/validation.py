@@ -13,7 +13,7 @@ from elevon.arrays import Bools, Floats
 from elevon.calibrate.kinematics import command_fit
 from elevon.errors import InputError, Interrupted, unknown
 from elevon.experiment import Experiment, Inputs
-from elevon.experiment.inputs import Table
+from elevon.experiment.experiment import Table
 from elevon.logs.command.note import align_noted
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.drive import drive_log

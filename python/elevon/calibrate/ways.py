@@ -14,11 +14,61 @@ from elevon.calibrate.stages.log import MOTION
 from elevon.calibrate.stages.smooth import LOAD
 from elevon.calibrate.validation import Validation, validate
 from elevon.errors import ElevonError, InputError
+from elevon.estimate.held_out import held_out
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.parameters.records import records, wirings
 from elevon.progress import Progress, part
 from elevon.recording import Recording
+
+
+def held_out_agreement(
+    logs: Sequence[Log],
+    before: Actuator,
+    free: Sequence[str] | None,
+    like: Validation,
+    progress: Progress | None = None,
+) -> Validation | None:
+    """Calibrate without each log in turn and hold the outcome against that log.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+        Healthy, as calibrated.
+    before : Actuator
+        Values before.
+    free : sequence of str or None
+        As calibrated.
+    like : Validation
+        Of the logs under values fitted to all: its transient and its offsets.
+    progress : callable, optional
+        Told the done fraction; returns False to stop.
+
+    Returns
+    -------
+    Validation or None
+        One row a log and signal; a log without which the others determine too little is left out.
+        None where nothing could be held out (a single log).
+    """
+    from elevon.calibrate.calibration import calibrate
+
+    if len(logs) < 2:
+        return None
+
+    def fit(others: Sequence[Log]) -> Actuator:
+        return calibrate(others, before, free=free, hold_out=False, model_runs=False).actuator
+
+    def judge(log: Log, model: Actuator, _share: Progress | None) -> Validation:
+        return validate([log], model, transient=like.transient)
+
+    rows = [
+        row
+        for _, judged in held_out(logs, fit, judge, progress)
+        if judged is not None
+        for row in judged.errors
+    ]
+    return replace(like, errors=tuple(rows)) if rows else None
+
 
 _LONG = 120.0  # s: a log of temperatures is no log of a motion to be predicted
 _NOT_COMPARED = "a log lacks a position: the closed loop is not compared"
@@ -257,7 +307,6 @@ class _Signals:
         return replace(result, validation_before=before, validation=after)
 
     def _held_out(self, result: Calibration, request: CalibrationRequest) -> Calibration:
-        from elevon.calibrate.promise import held_out_agreement
         from elevon.calibrate.thresholds import outliers
 
         after = result.validation

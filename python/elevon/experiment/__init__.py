@@ -1,7 +1,13 @@
 """A log's test run on a model: the one replay of logs, and inference's only door to the core."""
 
-from elevon.experiment.experiment import Experiment, Variant, run_all, signals_by_role
-from elevon.experiment.inputs import Inputs
-from elevon.experiment.model_run import ModelRun, Sensor
+from elevon.experiment.experiment import (
+    Experiment,
+    Inputs,
+    ModelRun,
+    Sensor,
+    Variant,
+    run_all,
+    signals_by_role,
+)
 
 __all__ = ["Experiment", "Inputs", "ModelRun", "Sensor", "Variant", "run_all", "signals_by_role"]

@@ -11,16 +11,170 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.errors import InputError, Interrupted
-from elevon.experiment.inputs import Inputs, Table, checked
-from elevon.experiment.model_run import ModelRun
 from elevon.faults import Fault
-from elevon.logs.log import Log
+from elevon.logs.log import Log, on_clock
 from elevon.parameters.records import positions
 from elevon.scenario import Scenario
 from elevon.scenario.compile import signal_records
 from elevon.simulate.acting import report
 from elevon.simulate.batch import simulate_prepared
 from elevon.simulate.prepare import Prepared, Run, prepare
+
+#: Instants from the run's beginning [s] and values there; straight lines between.
+Table = tuple[Floats, Floats]
+
+_EMPTY: Mapping[str, Any] = {"kind": "table", "times": [0.0, 1.0], "values": [0.0, 0.0]}
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Inputs of a run, SI.
+
+    Attributes
+    ----------
+    duration : float
+        s.
+    mode : str
+        What is commanded: ``position``, ``speed``, ``gear``, ...
+    command : (ndarray, ndarray) or None
+        In the unit of the mode.
+    actions : tuple of (float, str)
+        Instants and actions, where those are commanded.
+    loads : mapping of str to (ndarray, ndarray)
+        Port (``brake``, ``output``, ``rig_speed``, ...) to what acts there.
+    initial : mapping of str to float or str
+        Signal to where it starts.
+    """
+
+    duration: float
+    mode: str
+    command: Table | None = None
+    actions: tuple[tuple[float, str], ...] = ()
+    loads: Mapping[str, Table] = field(default_factory=dict)
+    initial: Mapping[str, float | str] = field(default_factory=dict)
+
+    def scenario(self) -> Scenario:
+        """Return the test with empty tables: their arrays are put in when all else is checked."""
+        command: dict[str, Any] = {"mode": self.mode}
+        if self.command is not None:
+            command["terms"] = [_EMPTY]
+        if self.actions:
+            command["steps"] = [{"time": time, "action": name} for time, name in self.actions]
+        document = {
+            "duration": self.duration,
+            "command": command,
+            "load": {port: {"terms": [_EMPTY]} for port in self.loads},
+            "initial": dict(self.initial),
+        }
+        return Scenario.from_dict(document)
+
+    def tables(self, name: str) -> dict[str, Table]:
+        """Return the arrays by port.
+
+        Raises
+        ------
+        InputError
+            Instants that do not increase, or what is no finite number; `name` is the log's.
+        """
+        tables = dict(self.loads)
+        if self.command is not None:
+            tables["command"] = self.command
+        return {port: checked(table, f"{name}: {port}") for port, table in tables.items()}
+
+
+def checked(table: Table, place: str) -> Table:
+    """Return a table as the core takes it; errors as `Inputs.tables`."""
+    times, values = (np.ascontiguousarray(x, dtype=np.float64) for x in table)
+    if len(times) != len(values) or not (np.isfinite(times).all() and np.isfinite(values).all()):
+        raise InputError(f"{place}: a sample is missing or no finite number")
+    if not np.all(np.diff(times) > 0.0):
+        raise InputError(f"{place}: time does not increase")
+    return times, values
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """How a log shows a channel: behind a filter, late, offset.
+
+    Attributes
+    ----------
+    delay : float
+        s.
+    offset : float
+        In the channel's unit.
+    lag : float
+        Time constant of a first-order filter, s.
+    unsigned : bool
+        Whether its sign is lost.
+    scale : float
+        Of the channel over the model's signal.
+    """
+
+    delay: float = 0.0
+    offset: float = 0.0
+    lag: float = 0.0
+    unsigned: bool = False
+    scale: float = 1.0
+
+
+_PLAIN = Sensor()
+
+
+@dataclass(frozen=True, eq=False)
+class ModelRun:
+    """One run.
+
+    Attributes
+    ----------
+    status : str
+        ``ok``, ``tripped`` or ``diverged``.
+    seconds : float
+        Simulated.
+    message : str
+        Why it ended, where it did before its end.
+    log : Log
+        On the run's own clock, which begins at zero.
+    """
+
+    status: str
+    seconds: float
+    message: str
+    log: Log
+
+    @property
+    def complete(self) -> bool:
+        """Whether it stayed within the finite numbers."""
+        return self.status in {"ok", "tripped"} and all(
+            np.isfinite(values).all() for values in self.log.channels.values()
+        )
+
+    def seen(self, log: Log, sensors: Mapping[str, Sensor] | None = None) -> Log:
+        """Return the run as a log's sensors would have shown it, on the log's instants."""
+        sensors = {} if sensors is None else sensors
+        channels = {
+            role: self._seen(role, log.time, sensors.get(role, _PLAIN)) for role in self.log
+        }
+        return replace(log, channels=channels, units=self.log.units, gain=None, recording=None)
+
+    def _seen(self, role: str, time: Floats, sensor: Sensor) -> Floats:
+        clock, values = self.log.time, self.log[role]
+        if sensor.unsigned:
+            values = np.abs(values)
+        if sensor.lag > 0.0:
+            values = _late(values, sensor.lag / self.log.period)
+        at = time - sensor.delay
+        seen = on_clock(clock, values, at, self.log.units.get(role, ""))
+        return sensor.scale * seen + sensor.offset
+
+
+def _late(values: Floats, lag: float) -> Floats:
+    """Return samples behind a first-order filter, `lag` in sample times, from rest."""
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-1.0 / lag))
+    start = np.array([keep * values[0]])
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])
+
 
 _CHUNK = 64  # runs held at once
 

@@ -17,11 +17,55 @@ from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.calibrate.stages.moves import Move, moves_of
-from elevon.calibrate.stages.third_phase import ThirdPhase
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed
 from elevon.estimate.signals import local_polynomial
 from elevon.logs.log import Log
+
+_ANGLES = (np.arange(32) + 0.5) / 32.0  # shares of half a sector
+
+
+@dataclass(frozen=True)
+class ThirdPhase:
+    """The circuit.
+
+    Attributes
+    ----------
+    emf : float
+        Flat top of one phase's EMF [V s/rad].
+    inductance : float
+        Of one phase [H].
+    period : float
+        Of the carrier [s].
+    drop : float
+        Of a diode [V].
+    """
+
+    emf: float
+    inductance: float
+    period: float
+    drop: float
+
+    def means(self, speed: Floats, duty: Floats, link: Floats) -> tuple[Floats, Floats]:
+        """Return means of line current [A] and braking torque [N m], both as sizes.
+
+        Parameters
+        ----------
+        speed, duty, link : ndarray, shape (n,)
+            Of the motor [rad/s]; share of the time in which the pair is on; voltage [V].
+        """
+        back = self.emf * np.abs(speed)[:, None] * _ANGLES
+        on, rail = duty[:, None], link[:, None]
+        above = np.maximum(back - 0.5 * self.drop, 0.0)
+        against = np.maximum(0.5 * (rail + self.drop) - above, 1e-3 * rail)
+        slope = self.period / (1.5 * self.inductance)
+        peak = slope * above * (1.0 - on)
+        falls = np.minimum(peak / (slope * against), on)
+        mean = 0.5 * peak * (1.0 - on) + falls * (peak - 0.5 * slope * against * falls)
+        # It flows in half of each sector, and half of it in each of the pair.
+        brakes = 0.5 * np.mean(mean * self.emf * _ANGLES, axis=1)
+        return 0.25 * np.mean(mean, axis=1), brakes
+
 
 _START = 0.1  # s after the drive begins ...
 _END = 0.06  # ... and before it ends
