@@ -185,6 +185,8 @@ def _way(
     logs: Sequence[Log], actuator: Actuator, *, validating: bool = False
 ) -> tuple[CalibrationWay | None, InputError | None]:
     """Return the way that needs more than an effort and a motion; or why there is none."""
+    if turns(actuator) and all(log.has("speed_ref") for log in logs):
+        _check_rates(logs)
     try:
         way = way_of(logs, actuator, validating=validating)
         if isinstance(way, _ClosedLoop):

@@ -28,14 +28,16 @@ BANDS = (0.6, 1.6)  # of the band: other choices that no log settles. ASSUMED
 ROUNDS = 2  # of runs of the model for an instrument
 THINNED = 2.5  # bands that the thinned rate holds: 0.8 of its half is the band. ASSUMED
 MOVING = 0.9  # of a filter's weight that must stem from samples in motion
-INSTRUMENT = 0.5  # of a regressor's variance that the commanded motion must explain
+#: Of a regressor's variance that the noiseless motion must explain. ASSUMED: with half of it, a
+#: square command made an inertia that is half too large
+INSTRUMENT = 0.9
 HAUSMAN = 2.0  # deviations between both estimates from which least squares counts as biased
 #: Of a number: a deviation beyond which it is not determined. ASSUMED: at half the number the
 #: interval of 90 % just leaves out zero
 SHARE = 0.5
 DISAGREE = 3.0  # deviations between two groups of logs that are said
 #: Terms beyond the four: what else the residual is tried for.
-EXTRAS = ("stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
+EXTRAS = ("load_loss", "stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
 DRAWN = 500  # samples of a log on the page
 SEEN = 4.0  # deviations from which a further term is reported, ...
 WORTH = 0.01  # ... and the share of the residual's variance that it explains
@@ -243,10 +245,10 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
             for s in (-half, half)]  # fmt: skip
     # An effort that is held between samples is late by half a period; one that is a mean is not.
     choices.append(regression.value + 0.5 * (late[1] - late[0]))
-    regression = regression.open_to(choices)
+    extras, seen, moved = _extras(rows, regression)
+    regression = regression.open_to([*choices, *moved])
     separate = _separate(rows, names, method)
     regression, findings = _between(regression, separate)
-    extras, seen = _extras(rows, regression)
     return Mechanics(
         regression, band, method, separate, extras, _friction_curve(rows, regression),
         _residuals(rows, regression), (*findings, *seen, _confounded(names)),
@@ -347,9 +349,12 @@ def _between(
 
 def _extras(
     rows: Sequence[InverseRows], regression: Regression
-) -> tuple[dict[str, Estimate], list[str]]:
-    """Return further terms that the residual shows, one at a time, and their words."""
-    names, result, texts = regression.names, {}, []
+) -> tuple[dict[str, Estimate], list[str], list[Floats]]:
+    """Return further terms that the residual shows, their words, and the numbers beside each.
+
+    What the model lacks moves its numbers: those of a model that has it are another choice.
+    """
+    names, result, texts, moved = regression.names, {}, [], []
     top = max(float(np.abs(item.speed).max()) for item in rows)
     for name in EXTRAS:
         columns = [c for item in rows if (c := _extra(name, item, top)) is not None]
@@ -369,24 +374,25 @@ def _extras(
             result[name] = item
             size = f"{item.value:.4g} +- {item.std:.2g}"
             texts.append(f"{name}: {size} explains {100 * less:.0f} % of what is left")
-    return result, texts
+            moved.append(tried.value[: len(names)])
+    return result, texts, moved
 
 
 def _extra(name: str, rows: InverseRows, top: float) -> Floats | None:
-    """Return the column of a further term."""
-    if name == "stribeck":
-        return np.asarray(np.sign(rows.speed) * np.exp(-((rows.speed / (0.05 * top)) ** 2)))
-    if name == "quadratic":
-        return np.asarray(rows.speed * np.abs(rows.speed))
-    if name == "spring":
-        return rows.position
+    """Return the column of a further term; None where the log cannot show it."""
+    speed, direction = rows.speed, np.sign(rows.speed)
     if name == "load":
         return rows.load
-    turns = np.ptp(rows.position) / (2.0 * np.pi)
-    if turns < 2.0:
-        return None
-    wave = np.cos if name == "ripple_cos" else np.sin
-    return np.asarray(wave(rows.position))
+    if name.startswith("ripple"):
+        turns = float(np.ptp(rows.position)) / (2.0 * np.pi)
+        wave = np.cos if name == "ripple_cos" else np.sin
+        return np.asarray(wave(rows.position)) if turns >= 2.0 else None
+    return {
+        "load_loss": direction * np.abs(rows.effort),
+        "stribeck": direction * np.exp(-((speed / (0.05 * top)) ** 2)),
+        "quadratic": speed * np.abs(speed),
+        "spring": rows.position,
+    }[name]
 
 
 def _confounded(names: tuple[str, ...]) -> str:
