@@ -4,11 +4,9 @@
 >>> load = flight_load(read_flight("flight.csv"), HingeMoment(...), limit=8750.0)  # doctest: +SKIP
 """
 
-from elevon.loads.airspeed import dynamic_pressure, mach_number
-from elevon.loads.atmosphere import Atmosphere, standard_atmosphere
+from elevon.loads.atmosphere import Atmosphere, dynamic_pressure, mach_number, standard_atmosphere
 from elevon.loads.flight import FlightData, read_flight
-from elevon.loads.hinge import HingeMoment
-from elevon.loads.table import LoadTable, flight_load
+from elevon.loads.table import HingeMoment, LoadTable, flight_load
 
 __all__ = [
     "Atmosphere",

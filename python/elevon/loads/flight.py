@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from elevon.errors import FormatError, InputError, Interrupted, RangeError, unknown
 from elevon.files import read_regular
-from elevon.loads.airspeed import AIRSPEED_KINDS, AirspeedKind
+from elevon.loads.atmosphere import AIRSPEED_KINDS, AirspeedKind
 from elevon.progress import Progress
 from elevon.units import check_kind, to_si
 
