@@ -32,7 +32,7 @@ DEMO := $(BIN)/elevon demo --out out/demo --force
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
 
-setup: $(STAMPS)/extension ## make .venv, install the locked packages, build the extension
+setup: $(STAMPS)/extension $(STAMPS)/cases ## make .venv, install the locked packages, build the extension, add the published cases
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -55,6 +55,12 @@ $(STAMPS)/extension: requirements.lock pyproject.toml $(RUST_SOURCES)
 	@$(MAKE) --no-print-directory --jobs=2 beginnings
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --locked
 	$(CAPI)
+	@touch $@
+
+# The published cases, as they lie in cases/; their build tool is one of the locked packages.
+$(STAMPS)/cases: cases/pyproject.toml $(STAMPS)/extension
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-index \
+		--no-build-isolation --editable ./cases
 	@touch $@
 
 capi: $(STAMPS)/packages ## the C interface: target/release/libelevon.a and .so, the header, the binary of FMUs
@@ -105,11 +111,12 @@ $(STAMPS)/docs: requirements-docs.lock $(STAMPS)/packages
 docs: setup $(STAMPS)/docs ## the documentation site, its links followed: out/docs/index.html
 	$(BIN)/python tools/pages/build.py
 
-wheel: $(STAMPS)/packages ## the wheel for this system in dist/, checked where there is no compiler
+wheel: $(STAMPS)/packages ## the wheels of product and cases in dist/, checked where there is no compiler
 	$(CAPI)
 	git rev-parse --short=12 HEAD > python/elevon/cli/commit.txt
 	$(BIN)/maturin build --release --quiet --locked --out dist
 	@rm -f python/elevon/cli/commit.txt
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-index --no-build-isolation --wheel-dir dist ./cases
 	$(BIN)/python tools/check_wheel.py dist
 
 sdist: $(STAMPS)/packages ## the source distribution in dist/, built once more from itself

@@ -10,7 +10,8 @@ import typer
 
 from elevon.cli.groups import NamingGroup
 from elevon.cli.output import answer, say
-from elevon.cli.reproduce.case import (
+from elevon.data import packaged_toml
+from elevon_cases.case import (
     Options,
     Values,
     add_command,
@@ -18,13 +19,12 @@ from elevon.cli.reproduce.case import (
     print_columns,
     read_cases,
 )
-from elevon.data import packaged_toml
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elevon.progress import Progress
-    from elevon.report import Report, provenance
+    from elevon.report import Report
     from studies.benchmark_set import BenchmarkScores
     from studies.fault_limits.limits import FaultLimits
 
@@ -146,7 +146,7 @@ def fault_limits_page(
     date: str | None = None,
 ) -> Report:
     """Return the report of the limits, with the command of these numbers."""
-    from elevon.report import Report, ReportTable
+    from elevon.report import Report, ReportTable, provenance
 
     report = Report(
         "Detection limits",

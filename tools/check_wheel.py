@@ -1,9 +1,10 @@
-"""Install a wheel where there is no compiler; use it without and with extras.
+"""Install a wheel where there is no compiler; use it without and with extras, then with the cases.
 
     python tools/check_wheel.py dist              the newest wheel of a folder
     python tools/check_wheel.py A.whl --from-sdist    made of the source distribution: no FMU binary
 
-Run by `make wheel` and `make sdist`. Prints the seconds from nothing to the first picture. Needs a
+Where the wheel of the published cases lies beside it, both together are used, too. Run by
+`make wheel` and `make sdist`. Prints the seconds from nothing to the first picture. Needs a
 package index, as every `pip install` does.
 """
 
@@ -17,6 +18,7 @@ import sys
 import tempfile
 import time
 import venv
+import zipfile
 from pathlib import Path
 
 MOST_MB = 130
@@ -75,7 +77,10 @@ def main(arguments: list[str]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         bare(Place(Path(folder)), wheel, fmus=not options.from_sdist)
     with tempfile.TemporaryDirectory() as folder:
-        everything(Place(Path(folder)), wheel)
+        place = Place(Path(folder))
+        everything(place, wheel)
+        for cases in sorted(wheel.parent.glob("elevon_cases-*.whl"))[-1:]:
+            published(place, wheel, cases)
     return 0
 
 
@@ -112,6 +117,27 @@ def everything(place: Place, wheel: Path) -> None:
     place.run("elevon", "bench", "run", "chirp", *unit, "--fidelity", "low", "--out", "logs")
     place.run("elevon", "diagnose", "logs/chirp.csv", *unit, "--baseline", "logs/chirp.csv")
     print("Parquet, pictures, diagnosis: with all extras, without a compiler")
+
+
+def published(place: Place, wheel: Path, cases: Path) -> None:
+    """No case is part of the product; both wheels together recompute one."""
+    foreign = [name for name in _names(wheel) if "reproduce" in name or "elevon_cases" in name]
+    if foreign:
+        raise SystemExit(f"{wheel.name} has published cases: {', '.join(foreign)}")
+    if not {"elevon_cases/cases.toml", "elevon_cases/catalogue/cases.toml"} <= _names(cases):
+        raise SystemExit(f"{cases.name}: its tables are missing")
+    output = place.run("elevon", "reproduce", "torino-compliance", "--json", fails=True)
+    if "pip install elevon-cases" not in output:
+        raise SystemExit(f"a command of another package does not name it: {output}")
+    place.run("python", *INSTALL, "--no-deps", str(cases))
+    place.run("python", "-m", "pip", "check")
+    place.run("elevon", "reproduce", "torino-backlash", "--out", "backlash")
+    print(f"{cases.name}: recomputes a published table beside the product's wheel")
+
+
+def _names(wheel: Path) -> set[str]:
+    with zipfile.ZipFile(wheel) as archive:
+        return set(archive.namelist())
 
 
 def _megabytes(packages: Path) -> float:

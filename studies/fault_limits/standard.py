@@ -81,7 +81,7 @@ def _rotary(
     progress: Progress | None,
 ) -> list[Log]:
     from elevon.bench.rig import setups
-    from elevon.reproduce.torino_bench.unit import logs_of
+    from elevon_cases.torino.bench_unit import logs_of
 
     ready = [
         setups(test.procedure, _of_day(actuator, day), faults=day.faults, seed=day.seed)[0]

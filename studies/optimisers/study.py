@@ -219,7 +219,7 @@ def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[J
     from elevon.bench.procedure import load_procedure
     from elevon.bench.rig import setups
     from elevon.bench.virtual import first_trace
-    from elevon.reproduce.torino_bench.unit import logs_of
+    from elevon_cases.torino.bench_unit import logs_of
 
     procedure = first_trace(load_procedure(_PROCEDURE))
     pairs: list[tuple[str, Setup]] = []

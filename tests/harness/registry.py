@@ -53,7 +53,7 @@ def writing():
 
 def shared_writer(command):
     """Tell whether a reproduction writes by the one writer that all of them share."""
-    return command.callback is not None and _module(command) == "elevon.cli.reproduce.case"
+    return command.callback is not None and _module(command) == "elevon_cases.case"
 
 
 def _module(command):

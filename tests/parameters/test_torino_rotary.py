@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import elevon
-from elevon.reproduce.compliance.campaign import reproduce_compliance
 from elevon.units import parse_quantity
+from elevon_cases.torino.compliance import reproduce_compliance
 
 ACTUATOR = elevon.Actuator.load("torino-rotary")
 

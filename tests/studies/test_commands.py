@@ -4,8 +4,8 @@ import pytest
 import typer
 
 from elevon.cli import main as elevon
-from elevon.cli.reproduce import STUDIES
-from elevon.cli.reproduce import app as reproduce
+from elevon_cases.commands import STUDIES
+from elevon_cases.commands import app as reproduce
 from studies import main
 from studies.commands import app
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from records import code, plain, table
 
-from elevon.reproduce.catalogue import PublishedWork, published, works
+from elevon_cases.catalogue import PublishedWork, published, works
 
 
 def pages(root: Path) -> Iterator[tuple[str, str]]:

@@ -12,8 +12,9 @@ from records import code, plain
 
 import elevon
 from elevon import _core
-from elevon.reproduce.signatures import Signature, reproduce_signatures
 from elevon.units import display_unit, format_quantity
+from elevon_cases import signatures
+from elevon_cases.signatures import Signature, reproduce_signatures
 
 COLOURS = ("#1f5fa8", "#b3261e")  # healthy, faulty: on white, contrast above 4.5
 
@@ -25,7 +26,7 @@ def pages(root: Path) -> Iterator[tuple[str, bytes]]:
     """
     package = Path(elevon.__path__[0])
     made_of = [*package.glob("_core*"), *package.glob("actuators/*.toml"), Path(__file__)]
-    made_of += [package / "data" / "fault_gallery.csv", package / "reproduce" / "signatures.py"]
+    made_of += [package / "data" / "fault_gallery.csv", Path(str(signatures.__file__))]
     key = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(made_of))).hexdigest()
     folder = root / "out" / "gallery" / key[:16]
     if not (folder / "whole").is_file():

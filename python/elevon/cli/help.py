@@ -83,12 +83,14 @@ def write_example(command: Any, ctx: Any, formatter: Any) -> None:
 
 
 def example_of(command: Any, path: str) -> str:
-    """Return the example of a command by its whole path, such as ``elevon campaign run``."""
+    """Return the example of a command by its whole path, such as ``elevon campaign run``.
+
+    A command of another package has the words of its example as its attribute ``example``.
+    """
     name = path.partition(" ")[2]
-    words = packaged_toml("elevon.cli", "commands.toml")["examples"].get(name)
-    if words is None and name.startswith("reproduce "):
-        writes = any("--out" in item.opts for item in command.params)
-        words = f"--out {name.rpartition(' ')[2]}" if writes else "--json"
+    words = getattr(command, "example", None)
+    if words is None:
+        words = packaged_toml("elevon.cli", "commands.toml")["examples"].get(name)
     return "" if words is None else f"elevon {name} {words}".strip()
 
 

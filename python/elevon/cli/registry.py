@@ -69,15 +69,25 @@ def commands() -> dict[str, CommandEntry]:
         for text in names:
             name, _, attribute = text.partition(":")
             places[name] = f"elevon.cli.{module}:{attribute or name.replace('-', '_')}"
+    table = packaged_toml("elevon.cli", "commands.toml")
     entries = {
         name: CommandEntry(
             places.get(name, f"elevon.cli.{name.replace('-', '_')}:app"), text, group
         )
-        for group, lines in packaged_toml("elevon.cli", "commands.toml")["purposes"].items()
+        for group, lines in table["purposes"].items()
         for name, text in lines.items()
     }
-    for point in entry_points(group=ENTRY_POINTS):
+    added = entry_points(group=ENTRY_POINTS)
+    for point in added:
         known = entries.get(point.name)
         text = known.help if known else f"Added by {point.value.partition('.')[0]}."
         entries[point.name] = CommandEntry(point.value, text, known.group if known else "Elsewhere")
+    for name in set(packages()) - {point.name for point in added}:
+        del entries[name]
     return entries
+
+
+def packages() -> dict[str, str]:
+    """Return the commands that other packages of Elevon add, and the package of each."""
+    named: dict[str, str] = packaged_toml("elevon.cli", "commands.toml")["packages"]
+    return named

@@ -16,7 +16,7 @@ import typer
 
 from elevon.cli import completion, interrupt
 from elevon.cli.groups import NamingGroup, UsageError
-from elevon.cli.registry import commands
+from elevon.cli.registry import commands, packages
 from elevon.errors import ElevonError, ElevonWarning, Interrupted
 from elevon.extras import missing_package
 from elevon.files import journal
@@ -46,6 +46,17 @@ class LazyGroup(NamingGroup):
         # Completion is installed for the program, not for one of its commands.
         loaded.params = [item for item in loaded.params if item.name not in _ROOT_ONLY]
         return loaded
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command of the first argument, or raise `UsageError`."""
+        package = packages().get(args[0]) if args and args[0] not in commands() else None
+        if package is not None:
+            raise UsageError(
+                f"'{args[0]}' is a command of the package {package}, which is not installed: "
+                f"pip install {package}, or pip install ./cases in a checkout of the sources",
+                ctx,
+            )
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click's signature
         """Write the commands by purpose from the registry, importing none of them."""

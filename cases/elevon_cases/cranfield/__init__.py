@@ -1,0 +1,1 @@
+"""Cranfield's recordings of a linear actuator."""

@@ -1,0 +1,1 @@
+"""The test stand for ballscrew actuators: profiles, faults, temperatures, flights."""

@@ -1,0 +1,1 @@
+"""The landing gear of the Pisa thesis: functional tests, friction, failures, monitoring."""

@@ -1,1 +1,0 @@
-"""Backlash of the Torino bench: measured, calculated, simulated and recovered."""

@@ -1,1 +1,0 @@
-"""Stiffness of the Torino bench's transmission from its forty drops of a weight."""

@@ -1,1 +1,0 @@
-"""Diagnosis of the Cranfield linear actuator from its recordings, without a model of it."""

@@ -1,1 +1,0 @@
-"""Nominal behaviour and faults of the NASA test stand's ballscrew actuator."""

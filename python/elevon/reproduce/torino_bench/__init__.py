@@ -1,1 +1,0 @@
-"""The Torino bench as the works use it: no-load validation, loaded campaign, dropped weights."""
