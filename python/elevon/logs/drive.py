@@ -80,10 +80,13 @@ def _voltage(log: Log) -> Floats | None:
     known = log.recording
     if known is not None and "voltage_q_ref" not in known:
         return None
-    if known is None or len(known["voltage_q_ref"].values) != len(log.time):
+    channel = None if known is None else known["voltage_q_ref"]
+    there = None if channel is None else np.isin(log.time, channel.time - log.start)
+    if channel is None or there is None or there.sum() != len(channel.values):
         values = log.get("torque_voltage")
     else:
-        values = np.array(known["voltage_q_ref"].values, dtype=np.float64)
+        values = np.full(len(log.time), np.nan)
+        values[there] = channel.values
     usable = values is not None and np.isfinite(values).sum() > len(values) // 2
     return values if usable else None
 

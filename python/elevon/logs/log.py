@@ -25,6 +25,10 @@ Value = TypeVar("Value")
 Arguments = ParamSpec("Arguments")
 #: Roles by whose channel the clock is chosen, where no other is named.
 _CLOCKS = ("speed_ref", "command", "output_position", "torque_current")
+_FEWEST_STEPS = 30  # of a clock that has a usual one
+_UNEVEN = 0.25  # of the usual step: half of the steps stray by more where there is none
+_LONG_STEP = 1.5  # usual steps: more than that lacks a row
+_MOST_MISSING = 4.0  # times the rows: a clock that lacks more is no clock with gaps
 _NEAR = 1.0  # s of the brake's level that a part of a log keeps beyond its ends
 
 
@@ -86,7 +90,8 @@ class Log:
     units : mapping of str to str
         Role to SI unit, where known.
     good : ndarray of bool, shape (n,)
-        Samples that count; all, unless stated.
+        Samples that count. Rows that the file lacks stand here as instants without a value that do
+        not count (`gaps_filled`); all others count, unless stated.
     start : float
         The file's instant of `time` zero [s].
     note : CommandNote or None
@@ -156,10 +161,10 @@ class Log:
         }
         units = {role: c.unit for role, c in served.items()}
         start = float(time[0]) if len(time) else 0.0
-        time = time - start
+        time, channels, good = gaps_filled(time - start, channels)
         speed = bridged(time, channels["motor_speed"]) if "motor_speed" in channels else None
         return cls(
-            name, time, channels, units, start=start, note=note, warnings=tuple(warnings),
+            name, time, channels, units, good, start, note=note, warnings=tuple(warnings),
             brake=brake_of(recording, note, time, start, speed), stand=StandSettings.of(recording),
             recording=recording,
         )  # fmt: skip
@@ -169,7 +174,7 @@ class Log:
         if self.recording is None or not len(self.time):
             return self
         channel = _served(self.recording).get(role)
-        if channel is not None and np.array_equal(channel.time, self.time + self.start):
+        if channel is not None and np.isin(channel.time - self.start, self.time).all():
             return self
         return Log.of(self.recording, self.name, note=self.note, warnings=self.warnings, clock=role)
 
@@ -301,6 +306,51 @@ def bridged(time: Floats, values: Floats, unit: str = "") -> Floats:
     if good.all() or not good.any():
         return values
     return on_clock(time[good], values[good], time, unit)
+
+
+def gaps_filled(
+    time: Floats, channels: Mapping[str, Floats]
+) -> tuple[Floats, dict[str, Floats], Bools]:
+    """Return a clock, its channels and what counts, with an instant for every row that is missing.
+
+    Instants of the file stay to the last bit. Between two that lie farther apart than 1.5 usual
+    steps, instants are added at the usual spacing; there every channel is NaN and nothing counts.
+    A clock without a usual step (half of its steps stray by more than a quarter of it), or with
+    more gaps than rows, is left as it is.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Seconds, increasing.
+    channels : mapping of str to ndarray, shape (n,)
+        By role.
+
+    Returns
+    -------
+    time, channels, good
+        Shapes (m,), m at least n.
+    """
+    same = time, dict(channels), np.ones(len(time), dtype=np.bool_)
+    steps = np.diff(time)
+    if len(steps) < _FEWEST_STEPS:
+        return same
+    period = float(np.median(steps))
+    if float(np.median(np.abs(steps / period - 1.0))) > _UNEVEN:
+        return same
+    missing = np.where(steps > _LONG_STEP * period, np.rint(steps / period) - 1.0, 0.0)
+    count = missing.astype(np.intp)
+    if not 0 < count.sum() <= _MOST_MISSING * len(time):
+        return same
+    places = np.arange(len(time)) + np.concatenate(([0], np.cumsum(count)))
+    good = np.zeros(len(time) + int(count.sum()), dtype=np.bool_)
+    good[places] = True
+    whole = np.interp(np.arange(len(good)), places, time)
+    whole[places] = time
+    out = {}
+    for role, values in channels.items():
+        out[role] = np.full(len(good), np.nan)
+        out[role][places] = values
+    return whole, out, good
 
 
 def _served(recording: Recording) -> dict[str, Channel]:
