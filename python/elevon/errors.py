@@ -252,9 +252,9 @@ def unknown(
 
 
 def quoted(text: str) -> str:
-    """Return foreign text safe to show: escaped, quoted, and cut to a readable length."""
+    """Return foreign text safe to show: quoted, cut, and escaped where it cannot be printed."""
     cut = text if len(text) <= _LONGEST_QUOTE else text[:_LONGEST_QUOTE] + "..."
-    return ascii(cut)
+    return repr(cut)
 
 
 def _plain(name: str) -> str:

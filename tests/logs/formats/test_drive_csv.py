@@ -137,9 +137,21 @@ def test_bad_files_are_refused_with_their_reason(tmp_path, content, message):
         import_log(path)
 
 
-def test_utf16_and_long_lines_are_refused(tmp_path):
+def test_utf16_is_read_as_utf8_is(tmp_path):
+    text = "\n".join([HEADER, *rows(20)]) + "\n"
+    tables = []
+    for name in ("utf-8", "utf-16", "utf-16-le"):
+        path = tmp_path / f"{name}.csv"
+        path.write_bytes((b"\xff\xfe" if name == "utf-16-le" else b"") + text.encode(name))
+        tables.append(read_text_table(path).columns)
+    for other in tables[1:]:
+        assert list(other) == list(tables[0])
+        assert all(np.array_equal(other[k], tables[0][k]) for k in other)
+
+
+def test_damaged_utf16_and_long_lines_are_refused(tmp_path):
     path = tmp_path / "bad.csv"
-    path.write_bytes(HEADER.encode("utf-16"))
+    path.write_bytes(HEADER.encode("utf-16") + b"\x00\xd8\x00")
     with pytest.raises(FormatError, match="UTF-16"):
         import_log(path)
     path.write_bytes(HEADER.encode() + b"\n" + b"1" * 100_000)
