@@ -14,6 +14,7 @@ from elevon.logs.maps.column_map import (
     ColumnEntry,
     ColumnMap,
     drive_columns,
+    drive_unit,
     find_drive_columns,
     known_roles,
     known_signals,
@@ -142,15 +143,17 @@ def settle_positions(
     motor, output = (playing(assigned, f"{which}_position") for which in ("motor", "output"))
     reference, trusted = None, False
     if motor is not None:
-        values = motor.values(table)[keep]
+        values, stated = motor.values(table)[keep], motor.factor
         motor.factor, trusted = settle_motor(
             _statement(motor), time, values, speeds, report, name=motor.signal
         )
+        motor.factor = motor.factor if stated is None else stated
         reference = values * motor.factor
     elif speeds:
         reference, trusted = travel_from_speed(time, speeds[0]), True
     if output is None or (gear_ratio is None and output.factor is not None):
         return
+    stated = output.factor
     values = output.values(table)[keep]
     if reference is None:
         reference = 0.0 * values
@@ -163,6 +166,7 @@ def settle_positions(
         trusted=trusted and gear_ratio is not None,
         name=output.signal,
     )
+    output.factor = output.factor if stated is None else stated
 
 
 def _statement(assignment: Assignment) -> PositionStatement:
@@ -173,6 +177,8 @@ def _statement(assignment: Assignment) -> PositionStatement:
 def _mapped(entry: ColumnEntry, table: RawTable, gear_ratio: float | None) -> Assignment:
     known = known_roles()[entry.role] if entry.role else known_signals().get(entry.channel)
     stated = entry.unit if entry.unit is not None else table.units.get(entry.name)
+    if stated and known:
+        stated = drive_unit(stated, known.units)
     place = f"{table.source}: column {quoted(entry.name)}"
     expected = unit_among(known.units if known else (stated or "1",), stated, place)
     unit = parse_unit(stated or expected, place)

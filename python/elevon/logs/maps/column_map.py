@@ -73,6 +73,32 @@ def known_signals() -> Mapping[str, LogSignal]:
     return known | {name: roles[role] for name, role in _TABLES["of_logs"].items()}
 
 
+def drive_unit(text: str, units: Collection[str]) -> str:
+    """Return a unit as drives write it in the package's spelling.
+
+    ``U/min`` is rpm. Where a speed of a shaft is expected, turns stand without their name:
+    ``1/min`` is rpm, ``Hz`` and ``1/s`` are rev/s.
+
+    Parameters
+    ----------
+    text : str
+        As the file states it.
+    units : collection of str
+        SI units that the quantity may have.
+    """
+    spelt = _TABLES["spellings"].get(text.strip().lower().replace(" ", ""), text.strip())
+    try:
+        dimension, size = parse_unit(spelt).dimension, parse_unit(spelt).factor
+    except InputError:
+        return text.strip()
+    turning = parse_unit("rad/s").dimension
+    if dimension == parse_unit("1/s").dimension and any(
+        parse_unit(unit).dimension == turning for unit in units
+    ):
+        return "rev/s" if size == 1.0 else "rpm" if abs(60.0 * size - 1.0) < 1e-9 else spelt
+    return spelt
+
+
 def unit_among(units: tuple[str, ...], stated: str | None, place: str) -> str:
     """Return the SI unit, of those a signal may have, that a stated unit is of; the first if none.
 

@@ -7,18 +7,28 @@ the integral of another, one that leads another, a size that only one unit expla
 from __future__ import annotations
 
 import json
+import math
 import re
+import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from elevon.arrays import Floats
 from elevon.data import packaged_toml
-from elevon.errors import FormatError, InputError, quoted
+from elevon.errors import FormatError, InputError, quoted, unknown
+from elevon.estimate.signals import integral
 from elevon.logs.formats.table import RawTable
 from elevon.logs.maps.agreement import evened, slope_and_fit
-from elevon.logs.maps.column_map import drive_columns, known_roles, known_signals, parameter_key
+from elevon.logs.maps.column_map import (
+    drive_columns,
+    drive_unit,
+    known_roles,
+    known_signals,
+    parameter_key,
+)
+from elevon.logs.maps.joint import KINDS, Candidate, Joint, assign_roles, drives_of
 from elevon.logs.maps.motion import MotionColumns, find_motion
 from elevon.units import Unit, parse_unit
 
@@ -26,6 +36,8 @@ _TIME = re.compile(r"^(x?ms|x|t|t_?ms|t_?s|zeit.*|.*time.*|.*timestamp.*|seconds
 _HINTS = packaged_toml("elevon.logs", "hints.toml")
 _SUFFIXES: Mapping[str, str] = _HINTS["suffixes"]
 _PER_SECOND = frozenset({"mm", "cm", "m", "rad", "deg", "rev"})
+_SPEED_UNITS = ("rad/s",)
+_COUNTS = frozenset(_HINTS["counts"]["words"])
 
 
 @dataclass(slots=True)
@@ -36,12 +48,33 @@ class GuessedColumn:
     role: str | None = None
     unit: str | None = None
     sign: int = 1
+    scale: float = 1.0
+    margin: float | None = None
     reasons: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What a log leaves open.
+
+    Attributes
+    ----------
+    role : str
+        Role that is doubtful; ``drive`` where several drives stand in one file.
+    candidates : list of str
+        Columns (of a drive: names; of a unit: units), the likeliest first.
+    text : str
+        The question, with the option that answers it.
+    """
+
+    role: str
+    candidates: list[str]
+    text: str
 
 
 def role_hint(header: str) -> str:
     """Return the role a header suggests; empty where it says nothing (``column_3``)."""
-    text = re.sub(r"[^a-z0-9]+", "_", _without_unit(header).lower()).strip("_")
+    text = _plain(_without_unit(header))
     if re.fullmatch(r"column_\d+", text):
         return ""
     if text in known_roles():
@@ -75,7 +108,7 @@ def unit_hint(header: str, stated: str) -> str:
     name = header.strip()
     tail = re.split(r"[_\s]+", name)[-1]
     if stated or ("/" in tail and tail != name):
-        return _known_unit(stated or tail)
+        return _known_unit(drive_unit(stated or tail, _SPEED_UNITS))
     key = parameter_key(header)
     if name.lower() == "xms":
         return "ms"
@@ -169,6 +202,9 @@ def _stated(
 
 _EVEN = 0.25  # of the columns that rise, the one whose steps scatter least is the time
 _MOVES = 0.05  # of a clock's steps, at least, are no repetition: a command that steps is no clock
+_LEAST = 30  # samples
+_STATES = 16  # different whole numbers, at most, of a state
+_STEADY = 0.05  # deviation over mean of a supply's voltage
 _CURRENT = 0.2  # share of a column that acceleration, friction and speed must explain
 _PHASE = "current_a"
 _DEFAULT_UNITS = packaged_toml("elevon.logs", "hints.toml")["default_units"]
@@ -197,31 +233,188 @@ class Guess:
     gear_ratio: float | None = None
     travel_per_turn: float | None = None
     swapped: tuple[str, str] | None = None
+    questions: tuple[Question, ...] = ()
+
+    def roles(self) -> list[dict[str, str | float | None]]:
+        """Return the roles given, each with its column, unit, reason and margin."""
+        return [
+            {"role": c.role, "column": c.name, "unit": c.unit, "reason": "; ".join(c.reasons),
+             "margin": c.margin}
+            for c in self.columns if c.role
+        ]  # fmt: skip
 
 
-def guess_map(table: RawTable) -> Guess:
+def guess_map(
+    table: RawTable, *, drive: str | None = None, answers: Mapping[str, str] | None = None
+) -> Guess:
     """Guess what the columns of a table are.
+
+    Parameters
+    ----------
+    table : RawTable
+        The log.
+    drive : str, optional
+        Which of several drives in the file.
+    answers : mapping of str to str, optional
+        Role to the column that has it, whatever the guess.
 
     Raises
     ------
     FormatError
         No column that could be the time.
+    InputError
+        No such drive, no such column or role.
     """
+    table, asked = _one_drive(table, drive)
+    answers = _checked(answers or {}, table)
     columns = {
         name: GuessedColumn(name, unit=unit_hint(name, table.units.get(name, "")) or None)
         for name in table.columns
     }
     time = _time(table, columns)
-    _headers(columns)
+    for role, name in answers.items():
+        columns[name].role = role
+        columns[name].reasons.append("as you say")
+    _headers(columns, table, answers)
+    joint = assign_roles(time, _joint_candidates(table, columns), _current_like(table, columns))
+    questions = asked + _settle_joint(joint, columns, answers)
     motion = find_motion(time, _candidates(table, columns))
     _apply(motion, columns)
     if motion.position is not None:
         _current(time, table, columns, motion)
-    _units(columns)
+    questions += _counts(time, table, columns) + _units(columns)
     return Guess(
         table.source, list(columns.values()), motion.gear_ratio, motion.travel_per_turn,
-        motion.swapped,
+        motion.swapped, tuple(questions),
     )  # fmt: skip
+
+
+def _one_drive(table: RawTable, drive: str | None) -> tuple[RawTable, list[Question]]:
+    """Return the columns of one drive, and the question which where several stand in the file."""
+    drives = drives_of(list(table.columns))
+    if drive is not None and drive not in drives:
+        if not drives:
+            raise InputError(f"{table.source}: --drive {drive}: the columns name no drives")
+        raise unknown("drive", drive, drives, table.source)
+    if not drives:
+        return table, []
+    chosen = drive or drives[0]
+    others = tuple(d for d in drives if d != chosen)
+    kept = {
+        name: values
+        for name, values in table.columns.items()
+        if not any(re.match(rf"{re.escape(other)}[ _.:/-]", name) for other in others)
+    }
+    question = Question(
+        "drive", drives, f"several drives stand in the file: {', '.join(drives)}; say --drive NAME"
+    )
+    return replace(table, columns=kept), [] if drive else [question]
+
+
+def _checked(answers: Mapping[str, str], table: RawTable) -> Mapping[str, str]:
+    for role, name in answers.items():
+        if role not in known_roles():
+            raise unknown("role", role, known_roles(), "--role")
+        if name not in table.columns:
+            raise unknown("column", name, table.columns, table.source)
+    return answers
+
+
+def _kind(item: GuessedColumn, stated: str) -> str:
+    """Return the kind of quantity a column's unit says; ``other`` for one that no motion has."""
+    if stated.strip().lower() in _COUNTS:
+        return "counts"
+    if not item.unit:
+        return "other" if stated.strip() else ""
+    return _KINDS.get(parse_unit(item.unit).dimension, "other")
+
+
+_KINDS = {
+    parse_unit(unit).dimension: kind
+    for unit, kind in (("rad", "angle"), ("m", "length"), ("rad/s", "turning"), ("m/s", "sliding"))
+}
+
+
+def _joint_candidates(table: RawTable, columns: Mapping[str, GuessedColumn]) -> list[Candidate]:
+    """Return the columns whose unit allows a role of motion, and which no other role has."""
+    chosen = []
+    for name, item in columns.items():
+        if item.role and item.role not in KINDS:
+            continue
+        kind = _kind(item, table.units.get(name, ""))
+        values = table.columns[name]
+        good = np.isfinite(values)
+        if kind == "other" or good.sum() <= _LEAST or not np.ptp(values[good]) > 0.0:
+            continue
+        if not kind and _is_state(values[good]):
+            continue
+        index = np.arange(len(values))
+        whole = np.interp(index, index[good], values[good])
+        hint = role_hint(name)
+        hint = item.role or (hint if hint in KINDS else "")
+        known = name.strip().lower() in {*known_roles(), *known_signals()}
+        own = bool(item.role or (hint and (known or parameter_key(name) is not None)))
+        scale = parse_unit(item.unit).factor if item.unit else 1.0
+        chosen.append(Candidate(name, kind, scale, whole, hint, own))
+    return chosen
+
+
+def _current_like(table: RawTable, columns: Mapping[str, GuessedColumn]) -> dict[str, Floats]:
+    """Return the columns that may be a current: in ampere, or in no unit and of no other role."""
+    chosen = {}
+    for name, item in columns.items():
+        values = table.columns[name]
+        bare = not (item.unit or table.units.get(name, "").strip() or item.role)
+        if (bare or _is_current(item)) and np.isfinite(values).all() and not _is_state(values):
+            chosen[name] = values
+    return chosen
+
+
+def _is_state(values: Floats) -> bool:
+    """Whether values are a few whole numbers: a mode or a flag, and no motion."""
+    return bool((values == np.rint(values)).all()) and len(np.unique(values)) <= _STATES
+
+
+def _settle_joint(
+    joint: Joint, columns: Mapping[str, GuessedColumn], answers: Mapping[str, str]
+) -> list[Question]:
+    """Give the columns the roles of the best assignment; return what it leaves open."""
+    questions = []
+    for item in columns.values():
+        if item.role in KINDS:
+            item.role = None
+    for role, name in joint.roles.items():
+        item = columns[name]
+        item.role, item.margin = role, round(joint.margins[role], 3)
+        item.reasons.append(joint.reasons[role])
+        if joint.others[role] and role not in answers:
+            candidates = [name, *filter(None, joint.others[role])]
+            listed = ", ".join(quoted(c) for c in candidates)
+            text = f"which column is the {role}: {listed}? say --role {role}=COLUMN"
+            questions.append(Question(role, candidates, text))
+    return questions
+
+
+def _counts(time: Floats, table: RawTable, columns: Mapping[str, GuessedColumn]) -> list[Question]:
+    """Settle positions in counts by the speed of their shaft; ask where there is none."""
+    questions = []
+    speed = next((c for c in columns.values() if c.role == "motor_speed" and c.unit), None)
+    for name, item in columns.items():
+        if item.role not in _PLACES or table.units.get(name, "").strip().lower() not in _COUNTS:
+            continue
+        slope = explained = 0.0
+        if speed is not None and item.role == "motor_position":
+            turned = np.nan_to_num(table.columns[speed.name]) * parse_unit(speed.unit or "").factor
+            slope, explained = slope_and_fit(integral(time, turned), table.columns[name])
+        if explained > _EXPLAINED and slope:
+            turn = round(2.0 * math.pi * abs(slope))
+            item.unit, item.scale = "rev", 1.0 / turn
+            item.reasons.append(f"{turn} counts a turn, by the speed of {speed.name!r}")  # type: ignore[union-attr]
+        else:
+            item.unit = None
+            text = f"{quoted(name)} is in counts: say what one is in a column map (unit, scale)"
+            questions.append(Question(item.role or "", ["rad", "rev", "mm"], text))
+    return questions
 
 
 def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> Floats:
@@ -251,14 +444,31 @@ def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> Floats:
     return np.asarray(evened(table.columns[name]) * scale, dtype=np.float64)
 
 
-def _headers(columns: Mapping[str, GuessedColumn]) -> None:
-    """Take roles from the headers; of two that suggest one role neither has it yet."""
+def _headers(
+    columns: Mapping[str, GuessedColumn], table: RawTable, answers: Mapping[str, str]
+) -> None:
+    """Take roles other than of motion from headers; of two that suggest one, neither has it yet."""
     hints = {name: role_hint(name) for name, item in columns.items() if not item.role}
+    amperes = [n for n, i in columns.items() if _is_current(i) and not i.role]
+    for name in amperes:
+        if hints[name] not in _CURRENT_ROLES:
+            wanted = re.search(_HINTS["words"]["wanted"], _plain(name)) is not None
+            hints[name] = "current_ref" if wanted else "torque_current"
     for name, role in hints.items():
-        if not role or role == "time":
+        if not role or role == "time" or role in KINDS or role in answers:
+            continue
+        if not _unit_allows(role, columns[name], table.units.get(name, "")):
+            columns[name].reasons.append(
+                f"its header suggests {role}, which is never in {table.units[name]}"
+            )
             continue
         if list(hints.values()).count(role) > 1:
             columns[name].reasons.append(f"its header suggests {role}, and so does another's")
+            continue
+        values = table.columns[name]
+        if role == "torque_voltage" and np.nanstd(values) < _STEADY * np.nanmean(values):
+            columns[name].role = "supply_voltage"
+            columns[name].reasons.append("a voltage that stays: the supply's")
             continue
         columns[name].role = role
         columns[name].reasons.append("by its header")
@@ -266,6 +476,31 @@ def _headers(columns: Mapping[str, GuessedColumn]) -> None:
             columns[name].role, columns[name].unit = "torque_current", "A"
             columns[name].reasons.append("the other headers end in units: in A, not of phase a")
         _drop_odd_unit(columns[name])
+
+
+_CURRENT_ROLES = frozenset(
+    {"torque_current", "current_ref", "direct_current", "supply_current", "current_a", "current_b",
+     "current_c"}
+)  # fmt: skip
+
+
+def _plain(header: str) -> str:
+    text = unicodedata.normalize("NFKD", header.replace("ß", "ss")).encode("ascii", "ignore")
+    return re.sub(r"[^a-z0-9]+", "_", text.decode().lower()).strip("_")
+
+
+def _is_current(item: GuessedColumn) -> bool:
+    return bool(item.unit) and parse_unit(item.unit or "").dimension == parse_unit("A").dimension
+
+
+def _unit_allows(role: str, item: GuessedColumn, stated: str) -> bool:
+    """Whether the unit that the file states is one of the role's."""
+    if not stated.strip() or role not in known_roles():
+        return True
+    if not item.unit:
+        return False
+    dimension = parse_unit(item.unit).dimension
+    return any(parse_unit(unit).dimension == dimension for unit in known_roles()[role].units)
 
 
 def _in_units(name: str, hints: Mapping[str, str], columns: Mapping[str, GuessedColumn]) -> bool:
@@ -339,6 +574,8 @@ def _current(
         good = np.isfinite(values)
         if item.role or good.sum() < 100 or not np.ptp(values[good]) > 0.0:
             continue
+        if (item.unit or table.units.get(name, "").strip()) and not _is_current(item):
+            continue
         design = np.column_stack((parts[good], np.ones(good.sum())))
         fit = design @ np.linalg.lstsq(design, values[good], rcond=None)[0]
         explained = slope_and_fit(fit, values[good])[1]
@@ -351,12 +588,19 @@ def _current(
         )
 
 
-def _units(columns: Mapping[str, GuessedColumn]) -> None:
-    """Give what still has no unit the usual one, and say so."""
+def _units(columns: Mapping[str, GuessedColumn]) -> list[Question]:
+    """Give what still has no unit the usual one, and say so; ask for that of a position."""
+    questions = []
     for item in columns.values():
         if item.role and not item.unit and item.role in _DEFAULT_UNITS:
             item.unit = _DEFAULT_UNITS[item.role]
             item.reasons.append(f"unit not stated: {item.unit} ASSUMED")
+    places = [c for c in columns.values() if c.role in (*_PLACES, "command")]
+    assumed = [c for c in places if any("no speed to tell" in reason for reason in c.reasons)]
+    for item in assumed:
+        text = f"in what unit is {quoted(item.name)}? say it in a column map (unit)"
+        questions.append(Question(item.role or "", ["m", "mm", "rad", "deg"], text))
+    return questions
 
 
 _HEAD = """# A first map of {source}: guessed, to be read and corrected.
@@ -367,7 +611,7 @@ _HEAD = """# A first map of {source}: guessed, to be read and corrected.
 
 def guess_text(guess: Guess) -> str:
     """Return the map's file."""
-    text = _HEAD.format(source=ascii(guess.source)[1:-1])
+    text = _HEAD.format(source=_comment(guess.source))
     if guess.travel_per_turn is not None:
         text += f'travel_per_turn = "{1e3 * guess.travel_per_turn:.6g} mm"  # as the data show\n'
     if guess.gear_ratio is not None:
@@ -384,11 +628,17 @@ _CURRENTS = {"torque_current", "current_ref", "direct_current", "torque_voltage"
 
 def _entry(item: GuessedColumn) -> str:
     lines = [f"# {_comment(reason)}" for reason in item.reasons]
-    lines += ["[[column]]", f"name = {json.dumps(item.name)}", f'role = "{item.role}"']
+    lines += [
+        "[[column]]",
+        f"name = {json.dumps(item.name, ensure_ascii=False)}",
+        f'role = "{item.role}"',
+    ]
     if item.unit:
-        lines.append(f"unit = {json.dumps(item.unit)}")
+        lines.append(f"unit = {json.dumps(item.unit, ensure_ascii=False)}")
     if item.sign < 0:
         lines.append("sign = -1")
+    if item.scale != 1.0:
+        lines.append(f"scale = {item.scale!r}")
     return "\n".join(lines) + "\n"
 
 

@@ -22,6 +22,7 @@ Candidates = Mapping[str, tuple[str, str, Floats]]
 _INTEGRAL = 0.9  # share of a position that the integral of its speed explains
 _FOLLOWS = 0.5  # share of a signal that its delayed set point explains
 _SAME = 0.02  # relative: a factor nearer one than this is one
+_ONE_SHAFT = 0.1  # as `_SAME` where headers state both units: a noisy speed is no gear
 _FAR_LESS = 0.67  # share of the motor's travel, at most, of an output behind a gear
 _LINEAR = {"mm": "mm/s", "m": "m/s", "cm": "cm/s", "um": "um/s"}
 _ANGULAR = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s"}
@@ -117,9 +118,9 @@ def _settle(motion: MotionColumns, candidates: Candidates, slope: float, explain
     position, speed = ColumnFinding(), ColumnFinding()
     motion.findings |= {motion.position: position, motion.speed: speed}
     position.reasons.append(
-        f"the integral of {motion.speed!a} explains {100 * explained:.1f} % of it"
+        f"the integral of {motion.speed!r} explains {100 * explained:.1f} % of it"
     )
-    speed.reasons.append(f"{motion.position!a} is its integral, times {slope:.4g}")
+    speed.reasons.append(f"{motion.position!r} is its integral, times {slope:.4g}")
     if slope < 0.0:
         speed.sign = -1
         speed.reasons.append("runs in the other direction")
@@ -137,7 +138,7 @@ def _settle(motion: MotionColumns, candidates: Candidates, slope: float, explain
         speed.reasons.append(f"{1e3 * motion.travel_per_turn:.4g} mm of travel for one turn")
     else:
         speed.role = "motor_speed"
-        if abs(math.log(factor)) < _SAME:
+        if abs(math.log(factor)) < (_ONE_SHAFT if all(units) else _SAME):
             position.role = hint or "motor_position"
             if hint == "output_position":
                 _swap(motion, candidates)
@@ -160,9 +161,9 @@ def _swap(motion: MotionColumns, candidates: Candidates) -> None:
         return
     motion.swapped = (moves, named)
     motion.findings[moves].role = "motor_position"
-    motion.findings[moves].reasons.append(f"swapped with {named!a}: it moves as the motor does")
+    motion.findings[moves].reasons.append(f"swapped with {named!r}: it moves as the motor does")
     motion.findings[named] = ColumnFinding(
-        "output_position", candidates[named][1], 1, [f"swapped with {moves!a}: it moves less"]
+        "output_position", candidates[named][1], 1, [f"swapped with {moves!r}: it moves less"]
     )
 
 
@@ -216,7 +217,7 @@ def _set_point(
         if hint != role and (lag < 0.0 or not 0.5 < slope < 2.0):
             continue
         if hint == role or explained > most:
-            text = f"{follower!a} follows it {1e3 * lag:.3g} ms later, {slope:.3g} times its size"
+            text = f"{follower!r} follows it {1e3 * lag:.3g} ms later, {slope:.3g} times its size"
             best, most = (name, text, explained), explained
         if hint == role:
             break
