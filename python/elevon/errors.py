@@ -62,6 +62,10 @@ class RangeError(InputError):
     """A number outside its limits, or not finite."""
 
 
+class QuestionError(InputError):
+    """A log leaves open what its columns are; the text names the option that answers it."""
+
+
 class FormatError(InputError):
     """A file whose content is not what its ending promises."""
 

@@ -154,10 +154,12 @@ def test_a_log_whose_columns_stand_otherwise_has_a_guess_of_its_own(tmp_path, ve
 
 
 def test_a_guess_that_does_not_hold_says_how_to_correct_it(tmp_path, monkeypatch):
-    def contradicted(path, *, column_map, **_):
-        raise (FormatError if column_map is None else InputError)("it contradicts the data")
+    def contradicted(table, mapped, *_, **__):
+        raise (FormatError if mapped is None else InputError)("it contradicts the data")
 
-    monkeypatch.setattr(read, "import_log", contradicted)
+    monkeypatch.setattr(read, "import_table", contradicted)
     log = written(tmp_path / "a.csv", motion())
-    with pytest.raises(InputError, match=r"the guess does not hold: .*a\.csv --guess map\.toml"):
+    with pytest.raises(
+        InputError, match=r"the guess does not hold: .*a\.csv --guess --out map\.toml"
+    ):
         elevon.doctor(log, "torino-rotary")

@@ -47,7 +47,7 @@ def written(path, motion, header, speed_scale=1e3):
 
 def guessed(tmp_path, capsys, log):
     target = tmp_path / "map.toml"
-    assert main(["import", str(log), "--guess", str(target), "--json"]) == 0
+    assert main(["import", str(log), "--guess", "--out", str(target), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     return answer, tomllib.loads(target.read_text())
 
@@ -139,7 +139,7 @@ def test_a_clock_whose_readings_repeat_has_a_unit():
 def test_what_cannot_be_guessed_is_refused(tmp_path, capsys, motion):
     log = tmp_path / "log.csv"
     np.savetxt(log, np.sin(np.arange(200.0)).reshape(-1, 2), delimiter=",")
-    assert main(["import", str(log), "--guess", str(tmp_path / "m.toml")]) == 2
+    assert main(["import", str(log), "--guess", "--out", str(tmp_path / "m.toml")]) == 2
     assert "none can be the time" in capsys.readouterr().err
     assert main(["import", str(log)]) == 2
     assert "--guess" in capsys.readouterr().err

@@ -175,13 +175,36 @@ def one_each(
     return list(given)
 
 
+def roles_said(given: Sequence[str] | None) -> dict[str, str]:
+    """Return what ``--role ROLE=COLUMN`` says, role to column.
+
+    Raises
+    ------
+    InputError
+        Not of that form, or a role said twice.
+    """
+    said: dict[str, str] = {}
+    for text in given or ():
+        role, sign, column = text.partition("=")
+        if not (role.strip() and sign and column.strip()):
+            raise InputError(f"--role {text!r}: expected ROLE=COLUMN")
+        if role.strip() in said:
+            raise InputError(f"--role: {role.strip()} is said twice")
+        said[role.strip()] = column.strip()
+    return said
+
+
 def read_logs(
     logs: Sequence[Path],
     column_map: Path | None = None,
     loadcell: list[Path] | None = None,
     command: list[Path] | None = None,
+    *,
+    drive: str | None = None,
+    role: list[str] | None = None,
 ) -> list[Log]:
     """Read logs with what stands beside them; warnings of the import go to stderr."""
+    from elevon.logs.read import Answers
     from elevon.logs.read import read_logs as read_all
 
     paths = without_companions(list(logs))
@@ -192,6 +215,7 @@ def read_logs(
         column_map,
         loadcells=one_each("--loadcell", loadcell, len(paths)),
         notes=one_each("--command", command, len(paths), shared=True),
+        answers=Answers(drive, roles_said(role)),
     )
     for log in read:
         for text in log.warnings:

@@ -129,13 +129,15 @@ def _sensor_text(name: str, value: float) -> str:
 
 @command(
     None, "strict", "details", "force", door="elevon.doctor.door:doctor", working="looking",
-    without=("loadcells", "notes", "false_alarm"),
+    without=("loadcells", "notes", "answers", "false_alarm"),
 )  # fmt: skip
 def doctor(
     door: DoorCall,
     *,
     loadcell: list[Path] | None = None,
     command: list[Path] | None = None,
+    drive: str | None = None,
+    role: list[str] | None = None,
     out: Annotated[Path | None, Option(metavar="DIR")] = None,
     force: bool = False,
 ) -> Answer:
@@ -146,6 +148,8 @@ def doctor(
     out : path
         Write page, answer and guessed map into this folder.
     """
+    from elevon.logs.read import Answers
+
     if out is not None:
         common.check_outputs([out / name for name in _DOCTOR_FILES], force=force)
     paths = common.without_companions(door.options["logs"])
@@ -154,6 +158,7 @@ def doctor(
         baselines=common.without_companions(door.options["baselines"] or []),
         loadcells=common.one_each("--loadcell", loadcell, len(paths)),
         notes=common.one_each("--command", command, len(paths), shared=True),
+        answers=Answers(drive, common.roles_said(role)),
     )
     if out is not None:
         for path in result.write(out, force=force):

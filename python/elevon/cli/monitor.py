@@ -49,6 +49,8 @@ def monitor(
     loadcell: list[Path] | None = None,
     command: list[Path] | None = None,
     column_map: Path | None = None,
+    drive: str | None = None,
+    role: list[str] | None = None,
     settings: list[str] | None = None,
     strict: bool = False,  # noqa: ARG001 - its callback does the work
     details: bool = False,  # noqa: ARG001 - its callback does the work
@@ -82,7 +84,7 @@ def monitor(
         longest=None if longest is None else parse_quantity(longest, "s", "--longest"),
         faults=fault,
     )
-    healthy = common.read_logs(baseline, column_map)
+    healthy = common.read_logs(baseline, column_map, drive=drive, role=role)
     unit = common.read_actuator(actuator, settings)
     if Path("-") in logs:
         _check_stream(logs, loadcell, command, json=json)
@@ -90,7 +92,7 @@ def monitor(
     elif state is not None:
         raise InputError("--state: serves a stream; give - as the log")
     else:
-        given = common.read_logs(logs, column_map, loadcell, command)
+        given = common.read_logs(logs, column_map, loadcell, command, drive=drive, role=role)
         _answer(given, unit, healthy, options, json=json)
 
 

@@ -45,6 +45,9 @@ SHARED: Mapping[str, Option] = {
     "command": Option(help="Command note; one for each log, or one for all. "
                            "By default NAME_command.json."),
     "column_map": Option("--map", help="Column map (TOML)."),
+    "drive": Option(metavar="NAME", help="Which drive, where a log holds several (a1)."),
+    "role": Option(metavar="ROLE=COLUMN", help="Column that has a role, where the log leaves it "
+                                               "open; repeatable."),
     "threads": Option(min=1, help="Threads; default one a core."),
     "scenario": Option(help="Scenario file (TOML)."),
     "date": Option(help="Date printed in the report."),
@@ -72,12 +75,17 @@ ADDED: Mapping[str, tuple[object, object]] = {
     "loadcell": (list[Path] | None, None),
     "command": (list[Path] | None, None),
     "column_map": (Path | None, None),
+    "drive": (str | None, None),
+    "role": (list[str] | None, None),
 }
 #: Types of what is not read as its annotation says.
 _READ: Mapping[str, Any] = {"actuator": str, "file": str, "path": Path}
 _NAMED = ("actuator", "file", "faults")  # how these are written is the same everywhere
 #: Options that come with what an argument is read as.
-ACCOMPANYING = {"actuator": ("settings",), "logs": ("loadcell", "command", "column_map")}
+ACCOMPANYING = {
+    "actuator": ("settings",),
+    "logs": ("loadcell", "command", "column_map", "drive", "role"),
+}
 
 
 def _strict(value: bool) -> bool:

@@ -16,22 +16,28 @@ from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from elevon.arrays import Floats
+    from elevon.logs.formats.table import RawTable
     from elevon.logs.importing import ImportedLog
+    from elevon.logs.maps.guess import Guess
+    from elevon.logs.read import Answers
     from elevon.logs.report import ImportReport
     from elevon.recording import Recording
+    from elevon.report import Report
     from elevon.results import Result
 
 
-@command(None)
+@command(None, "report")
 def import_(
     logs: list[Path],
     *,
     out: Path | None = None,
-    guess: Path | None = None,
+    guess: bool = False,
     log_format: Annotated[str, Option("--format")] = "auto",
     column_map: Path | None = None,
     loadcell: list[Path] | None = None,
     command: list[Path] | None = None,
+    drive: str | None = None,
+    role: list[str] | None = None,
     gear_ratio: float | None = None,
     sidecars: Annotated[bool, Option("--sidecars/--no-sidecars")] = True,
     force: bool = False,
@@ -43,9 +49,10 @@ def import_(
     logs : list of path
         Log files.
     out : path
-        Recording to write (.parquet, .nc, .mat, .csv); a folder for several logs.
-    guess : path
-        Write a first column map (TOML) of one log, to be corrected.
+        Recording to write (.parquet, .nc, .mat, .csv); a folder for several logs; with --guess a
+        map (.toml).
+    guess : bool
+        Say what the columns of one log are, and what is doubtful; --out writes it as a map.
     log_format : str
         auto, drive, csv, parquet, netcdf, mat, recording or cranfield.
     column_map : path
@@ -60,13 +67,15 @@ def import_(
         Look for NAME_loadcell.csv and NAME_command.json beside a log.
     """
     from elevon.logs.formats.detect import FORMATS
+    from elevon.logs.read import Answers
 
     if log_format not in FORMATS:
         raise unknown("format", log_format, FORMATS, "--format")
-    if guess is not None:
-        return _write_guess(logs, guess, out, log_format=log_format, force=force)
+    answers = Answers(drive, common.roles_said(role))
+    if guess:
+        return _write_guess(logs, out, answers, log_format=log_format, force=force)
     if out is None:
-        raise InputError("--out is missing: a recording to write; or --guess, a first column map")
+        raise InputError("--out is missing: a recording to write; or --guess, what its columns are")
     if log_format == "cranfield":
         return _cranfield(logs, out, force=force)
     logs = common.without_companions(logs) if sidecars else logs
@@ -76,7 +85,7 @@ def import_(
     _check_files(targets, force=force)
     imported = _read_all(
         logs, cells, notes, log_format=log_format, column_map=column_map,
-        gear_ratio=gear_ratio, sidecars=sidecars,
+        gear_ratio=gear_ratio, sidecars=sidecars, answers=answers,
     )  # fmt: skip
     for log, target in zip(imported, targets, strict=True):
         log.recording.save(target, force=force)
@@ -89,45 +98,91 @@ def import_(
 
 
 def _write_guess(
-    logs: list[Path], target: Path, out: Path | None, *, log_format: str, force: bool
+    logs: list[Path], target: Path | None, answers: Answers, *, log_format: str, force: bool
 ) -> Answer:
-    """Write a first column map, and say why every column is what it is."""
+    """Say why every column is what it is and what is doubtful; write it as a map where wanted."""
     from elevon.files import check_output, write_text
     from elevon.logs.formats.detect import read_table
     from elevon.logs.maps.guess import guess_map, guess_text
 
-    if len(logs) != 1 or out is not None:
-        raise InputError("--guess writes the map of one log, and no recording")
-    check_output(target, force=force)
-    guess = guess_map(read_table(logs[0], log_format))
-    write_text(target, guess_text(guess), force=force)
+    if len(logs) != 1:
+        raise InputError("--guess looks at one log; its map is written with --out map.toml")
+    if target is not None:
+        if target.suffix.lower() != ".toml":
+            raise InputError(f"--out {target}: --guess writes a map (.toml), and no recording")
+        check_output(target, force=force)
+    table = read_table(logs[0], log_format)
+    guess = guess_map(table, drive=answers.drive, answers=answers.roles)
+    if target is not None:
+        write_text(target, guess_text(guess), force=force)
     data = {
         "status": "ok",
         "log": str(logs[0]),
-        "map": str(target),
+        "map": None if target is None else str(target),
         "gear_ratio": guess.gear_ratio,
         "travel_per_turn_m": guess.travel_per_turn,
+        "roles": guess.roles(),
+        "questions": [{"role": q.role, "candidates": q.candidates} for q in guess.questions],
         "columns": guess.columns,
     }
 
     def show() -> None:
         rows = [(c.name, c.role or "?", c.unit or "", "; ".join(c.reasons)) for c in guess.columns]
-        print_table(("column", "role", "unit", "why"), rows, title=f"{logs[0]} -> {target}")
+        title = f"{logs[0]}" + ("" if target is None else f" -> {target}")
+        print_table(("column", "role", "unit", "why"), rows, title=title)
+        for question in guess.questions:
+            answer(f"? {question.text}")
 
-    return Answer(data, show)
+    return Answer(data, show, page=lambda: guess_page(guess, table))
+
+
+def guess_page(guess: Guess, table: RawTable) -> Report:
+    """Return the page of a guess: each role's signal with the reason beside it."""
+    from elevon.report import Report, ReportTable
+
+    report = Report(
+        f"Columns of {Path(guess.source).name}", "What each column is taken for, and why."
+    )
+    doubtful = len(guess.questions)
+    report.judge(
+        f"{doubtful} questions" if doubtful else "no question", "open" if doubtful else "pass"
+    )
+    if guess.questions:
+        report.section("Questions").points([question.text for question in guess.questions])
+    time = next(c for c in guess.columns if c.role == "time")
+    seconds = table.columns[time.name]
+    for item in guess.columns:
+        if item.role and item.role != "time":
+            margin = "" if item.margin is None else f" Margin {item.margin:.2f}."
+            section = report.section(item.role, f"{item.name}: {'; '.join(item.reasons)}.{margin}")
+            label = f"{item.name} [{item.unit or 'no unit'}]"
+            section.chart(label, seconds, {item.name: table.columns[item.name]})
+    known = report.section("All columns")
+    rows = [
+        {"column": c.name, "role": c.role or "not known", "unit": c.unit or ""}
+        for c in guess.columns
+    ]
+    known.table(ReportTable.of(rows))
+    return report
 
 
 def _read_all(
     logs: list[Path],
     cells: list[Path | None],
     notes: list[Path | None],
+    log_format: str,
+    answers: Answers,
     **options: Any,
 ) -> list[ImportedLog]:
     from elevon.logs.importing import import_log, same_rate
+    from elevon.logs.read import imported_log
 
     imported = []
     for path, cell, note in zip(logs, cells, notes, strict=True):
-        log = import_log(path, loadcell=cell, command=note, **options)
+        if log_format == "auto":
+            log = imported_log(path, note=note, loadcell=cell, answers=answers, **options)
+        else:
+            log = import_log(path, loadcell=cell, command=note, log_format=log_format, **options)
         for finding in log.report.findings:
             if finding.level == "warning":
                 say(f"{path}: {finding.place}: {finding.text}")
@@ -230,6 +285,8 @@ def plot(
     out: list[Path] | None = None,
     run: Annotated[int | None, Option(min=0)] = None,
     column_map: Path | None = None,
+    drive: str | None = None,
+    role: list[str] | None = None,
     compare: Path | None = None,
     spectra: bool = False,
     force: bool = False,
@@ -252,13 +309,16 @@ def plot(
     spectra : bool
         Add spectra of error, current and speed.
     """
+    from elevon.logs.read import Answers
+
     targets = _targets(file, out)
     common.check_outputs(targets, force=force)
     if file.suffix.lower() == ".json":
         _only_signals(signal, run, column_map, compare, spectra)
         return _result(file, targets, force=force)
-    recording = _recording(file, run, column_map)
-    other = None if compare is None else _recording(compare, None, column_map)
+    answers = Answers(drive, common.roles_said(role))
+    recording = _recording(file, run, column_map, answers)
+    other = None if compare is None else _recording(compare, None, column_map, answers)
     if other is not None and compare is not None:
         other = other.with_meta(label=compare.name)
     for path in targets:
@@ -293,8 +353,8 @@ def _only_signals(
         raise InputError(f"{wrong}: a result has no signals; it is drawn as a whole")
 
 
-def _recording(file: Path, run: int | None, column_map: Path | None) -> Recording:
-    from elevon.logs.read import import_foreign
+def _recording(file: Path, run: int | None, column_map: Path | None, answers: Answers) -> Recording:
+    from elevon.logs.read import import_foreign, settled
 
     if file.expanduser().is_dir():
         from elevon.campaign import load_run
@@ -302,7 +362,7 @@ def _recording(file: Path, run: int | None, column_map: Path | None) -> Recordin
         return load_run(file.expanduser(), run or 0)
     if run is not None:
         raise InputError(f"--run: {file} is no folder of a campaign")
-    return import_foreign(file, column_map).imported.recording
+    return settled(import_foreign(file, column_map, answers=answers)).recording
 
 
 def _title(file: Path, run: int | None) -> str:

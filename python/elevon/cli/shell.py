@@ -105,9 +105,11 @@ class DoorCall:
             return common.read_faults(given, values["actuator"].wiring)
         if item.option.reads == "logs" and item.argument:
             with_logs = (options[name] for name in ("column_map", "loadcell", "command"))
-            return common.read_logs(given, *with_logs)
+            return common.read_logs(given, *with_logs, drive=options["drive"], role=options["role"])
         if item.option.reads == "logs":
-            return common.read_logs(given, options["column_map"])
+            return common.read_logs(
+                given, options["column_map"], drive=options["drive"], role=options["role"]
+            )
         return given
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, TypeVar
 
 from elevon.calibrate.door import validate
 from elevon.calibrate.validation import TRANSIENT, Validation
@@ -15,7 +15,7 @@ from elevon.errors import InputError
 from elevon.logs.log import Log
 from elevon.logs.maps.column_map import ColumnMap, find_map
 from elevon.logs.maps.guess import guess_text
-from elevon.logs.read import ForeignLog, import_foreign, named_apart
+from elevon.logs.read import NO_ANSWERS, Answers, ForeignLog, import_foreign, named_apart, settled
 from elevon.option import Option
 from elevon.progress import Progress, part
 from elevon.simulate.prepare import ActuatorLike, as_actuator
@@ -36,6 +36,7 @@ def doctor(
     map: Annotated[ColumnMap | str | Path | None, Option("--map")] = None,  # noqa: A002 - the option's name
     loadcells: Sequence[PathLike | None] = (),
     notes: Sequence[PathLike | None] = (),
+    answers: Answers = NO_ANSWERS,
     false_alarm: float = 0.05,
     progress: Progress | None = None,
 ) -> Examination:
@@ -53,6 +54,8 @@ def doctor(
         What the columns are, in all logs; else their headers say it, or a guess.
     loadcells, notes : sequence of path or None
         One for each log; by default those that stand beside it.
+    answers : Answers
+        To what the guess of their columns asks: which drive, which column has a role.
     false_alarm : float
         Rate at which a healthy unit may be called faulty.
     progress : callable, optional
@@ -73,7 +76,7 @@ def doctor(
     if not given:
         raise InputError("doctor: needs at least one log")
     column_map = find_map(map) if isinstance(map, (str, Path)) else map
-    read = _read([*given, *healthy], column_map, loadcells, notes)
+    read = _read([*given, *healthy], column_map, loadcells, notes, answers)
     named = named_apart([item.imported for item in read])
     unit, reference = named[: len(given)], named[len(given) :]
     fit, no_fit = _tried(lambda: _fit([*unit, *reference], model, part(progress, 0.0, 0.4)))
@@ -107,23 +110,33 @@ def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
     return [Path(p) for p in ([given] if isinstance(given, (str, os.PathLike)) else given)]
 
 
+class Beside(TypedDict):
+    """Files that stand beside a log."""
+
+    loadcell: Path | None
+    command: Path | None
+
+
 def _read(
     paths: Sequence[Path],
     column_map: ColumnMap | None,
     loadcells: Sequence[PathLike | None],
     notes: Sequence[PathLike | None],
+    answers: Answers,
 ) -> list[ForeignLog]:
     """Read the logs; the map guessed of one serves those after it that it does not contradict."""
     cells, texts = [*loadcells, *[None] * len(paths)], [*notes, *[None] * len(paths)]
     read: list[ForeignLog] = []
     for path, cell, note in zip(paths, cells, texts, strict=False):
         guessed = next((log.column_map for log in read if log.guess is not None), None)
-        sidecars = {"loadcell": _path(cell), "command": _path(note)}
+        beside = Beside(loadcell=_path(cell), command=_path(note))
         try:
-            read.append(import_foreign(path, column_map or guessed, **sidecars))
+            read.append(import_foreign(path, column_map or guessed, **beside, answers=answers))
+            settled(read[-1])
         except InputError as error:
             if column_map is None and guessed is not None:
-                read.append(import_foreign(path, **sidecars))
+                read.append(import_foreign(path, **beside, answers=answers))
+                settled(read[-1])
             elif str(path) in str(error):
                 raise
             else:

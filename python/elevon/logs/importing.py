@@ -174,15 +174,38 @@ def import_log(
         Anything in the files that cannot be read as one consistent log.
     """
     if log_format in {"auto", "recording"}:
-        saved = _saved(path, log_format)
+        saved = saved_log(path, log_format)
         if saved is not None:
             return saved if command is None else replace(saved, note=read_command_note(command))
     near_cell, near_note = find_sidecars(path) if sidecars else (None, None)
     note_path = command or near_note
     note = None if note_path is None else read_command_note(note_path)
     mapped = find_map(column_map) if isinstance(column_map, (str, Path)) else column_map
-    table = read_table(path, log_format, limits)
-    report = ImportReport(str(path), table.file_format)
+    return import_table(
+        read_table(path, log_format, limits), mapped, note, loadcell or near_cell,
+        log_format=log_format, gear_ratio=gear_ratio, limits=limits,
+    )  # fmt: skip
+
+
+def import_table(
+    table: RawTable,
+    mapped: ColumnMap | None = None,
+    note: CommandNote | None = None,
+    loadcell: str | Path | None = None,
+    *,
+    log_format: str = "auto",
+    gear_ratio: float | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> ImportedLog:
+    """Make a table of columns into a recording; as `import_log`, which reads it from a file.
+
+    Raises
+    ------
+    InputError, FormatError
+        As `import_log`.
+    """
+    path = table.source
+    report = ImportReport(path, table.file_format)
     for text in table.notes:
         report.say("file", "format", text)
     if gear_ratio is None and mapped is None and note is not None:
@@ -191,14 +214,17 @@ def import_log(
     assigned = assign_columns(table, mapped, ratio, report, layout=log_format)
     quality, time = _clock(table, assigned, report)
     settle_positions(assigned, table, time, quality.keep, ratio, report=report)
-    convention = settle_currents(assigned, mapped, note, report)
+    drive = log_format == "drive" or (log_format != "csv" and looks_like_drive(table))
+    usual = "rms" if drive or mapped is not None else "peak"
+    convention = settle_currents(assigned, mapped, note, report, usual=usual)
     recording = _build(table, assigned, quality, time, report=report)
     check_agreement(recording, ratio, report, mapped)
     examine_channels(recording, ratio, report)
-    cell = loadcell or near_cell
-    if cell is not None:
-        recording = join_loadcell(recording, cell, note, report, limits, gear_ratio=ratio)
+    if loadcell is not None:
+        recording = join_loadcell(recording, loadcell, note, report, limits, gear_ratio=ratio)
     meta = _meta(path, report, note, ratio, convention)
+    if table.attributes:
+        meta["notes"] = dict(table.attributes)
     return ImportedLog(recording.with_meta(**meta), report, note)
 
 
@@ -219,7 +245,7 @@ def same_rate(logs: list[ImportedLog]) -> None:
             )
 
 
-def _saved(path: str | Path, log_format: str) -> ImportedLog | None:
+def saved_log(path: str | Path, log_format: str) -> ImportedLog | None:
     """Return a recording that this package saved, as it is; None for anything else."""
     file = Path(path).expanduser()
     if log_format == "auto" and not (file.is_file() and _begins_saved(file)):
@@ -311,8 +337,14 @@ def settle_currents(
     mapped: ColumnMap | None,
     note: CommandNote | None,
     report: ImportReport,
+    *,
+    usual: str = "rms",
 ) -> str:
-    """Settle the convention of the drive's currents: what is stated twice must agree."""
+    """Settle the convention of the drive's currents: what is stated twice must agree.
+
+    Where nobody states one the `usual` one is taken: of the drive's trace rms, else peak (ASSUMED,
+    as a field-oriented drive logs the torque current).
+    """
     conventions = {
         c for c in (mapped.current if mapped else None, note.current if note else None) if c
     }
@@ -321,7 +353,7 @@ def settle_currents(
             f"{report.source}: the column map and the command note disagree on the currents "
             "(rms, peak)"
         )
-    convention = conventions.pop() if conventions else "rms"
+    convention = conventions.pop() if conventions else usual
     changed = rms_to_peak(assigned) if convention == "rms" else []
     stated = (mapped and mapped.current) or (note and note.current)
     if changed:

@@ -174,8 +174,10 @@ class Log:
         if self.recording is None or not len(self.time):
             return self
         channel = _served(self.recording).get(role)
-        if channel is not None and np.isin(channel.time - self.start, self.time).all():
-            return self
+        if channel is not None:
+            whole = gaps_filled(np.asarray(channel.time) - self.start, {})[0]
+            if np.array_equal(whole, self.time):
+                return self
         return Log.of(self.recording, self.name, note=self.note, warnings=self.warnings, clock=role)
 
     @cached_property

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, cast
 
 from elevon.documents import Document, validated
-from elevon.errors import FormatError, InputError
+from elevon.errors import FormatError, InputError, QuestionError
+from elevon.logs.command.note import CommandNote, read_command_note
 from elevon.logs.drive import drive_log
 from elevon.logs.formats.detect import read_table
-from elevon.logs.importing import ImportedLog, import_log, same_rate
+from elevon.logs.formats.frames import Source, table_of
+from elevon.logs.formats.table import RawTable
+from elevon.logs.importing import ImportedLog, find_sidecars, import_table, same_rate, saved_log
 from elevon.logs.log import Log
 from elevon.logs.maps.column_map import ColumnMap, find_map
 from elevon.logs.maps.guess import Guess, guess_map, guess_text
@@ -29,29 +32,56 @@ LogsLike = Annotated[
 ]
 
 
+@dataclass(frozen=True)
+class Answers:
+    """Answers to what a guess asks.
+
+    Attributes
+    ----------
+    drive : str or None
+        Which of several drives in the file.
+    roles : mapping of str to str
+        Role to the column that has it.
+    """
+
+    drive: str | None = None
+    roles: Mapping[str, str] = field(default_factory=dict)
+
+
+NO_ANSWERS = Answers()
+
+
 def read_log(
-    path: str | Path,
+    path: Source,
     map: MapLike = None,  # noqa: A002 - the option's name
     note: str | Path | None = None,
     loadcell: str | Path | None = None,
     *,
     gear_ratio: float | None = None,
     sidecars: bool = True,
+    drive: str | None = None,
+    roles: Mapping[str, str] | None = None,
 ) -> Log:
     """Read a log, or a recording of the package's own.
 
     Parameters
     ----------
-    path : path
-        In any format that `elevon.logs.importing.import_log` reads.
+    path : path, DataFrame, Dataset or mapping of str to array_like
+        A file in any format that `elevon.logs.importing.import_log` reads; or the columns
+        themselves: a DataFrame of pandas or polars, a Dataset of xarray, arrays by name. Masked
+        and missing values become gaps.
     map : ColumnMap or path, optional
-        What the columns are, where the headers do not say it.
+        What the columns are. Without one they are guessed from data, units and headers.
     note, loadcell : path, optional
         Command note and load-cell file; by default those that stand beside the log.
     gear_ratio : float, optional
         Motor over output.
     sidecars : bool
         Whether files beside the log are looked for.
+    drive : str, optional
+        Which drive, where the file holds several.
+    roles : mapping of str to str, optional
+        Role to the column that has it, where the guess leaves it open.
 
     Returns
     -------
@@ -60,10 +90,16 @@ def read_log(
 
     Raises
     ------
+    QuestionError
+        The columns leave open which one has a role, or which drive is meant.
     InputError, FormatError
         Anything in the files that cannot be read as one consistent log.
     """
-    return log_of(_imported(path, map, note, loadcell, gear_ratio=gear_ratio, sidecars=sidecars))
+    answers = Answers(drive, roles or {})
+    return log_of(
+        imported_log(path, map, note, loadcell, gear_ratio=gear_ratio, sidecars=sidecars,
+                  answers=answers)
+    )  # fmt: skip
 
 
 def log_of(imported: ImportedLog) -> Log:
@@ -81,6 +117,7 @@ def read_logs(
     loadcells: Sequence[str | Path | None] = (),
     notes: Sequence[str | Path | None] = (),
     one_rate: bool = False,
+    answers: Answers = NO_ANSWERS,
 ) -> list[Log]:
     """Read several logs; of those with one name the folder stands before it.
 
@@ -94,6 +131,8 @@ def read_logs(
         One for each log, or none at all.
     one_rate : bool
         Refuse logs of different rates.
+    answers : Answers
+        To what the guess of their columns asks.
 
     Raises
     ------
@@ -104,7 +143,9 @@ def read_logs(
     texts = [*notes, *[None] * len(paths)]
     one = map is None or isinstance(map, (ColumnMap, str, Path))
     maps = cast("list[MapLike]", [map] * len(paths) if one else list(map))  # type: ignore[arg-type]
-    read = [_imported(p, maps[k], texts[k], cells[k]) for k, p in enumerate(paths)]
+    read = [
+        imported_log(p, maps[k], texts[k], cells[k], answers=answers) for k, p in enumerate(paths)
+    ]
     if one_rate:
         same_rate(read)
     return named_apart(read)
@@ -135,20 +176,30 @@ def read_drive_logs(
     return [drive_log(log) for log in logs]
 
 
-def _imported(
-    path: str | Path,
-    column_map: MapLike,
-    note: str | Path | None,
-    loadcell: str | Path | None,
+def imported_log(
+    path: Source,
+    column_map: MapLike = None,
+    note: str | Path | None = None,
+    loadcell: str | Path | None = None,
     *,
     gear_ratio: float | None = None,
     sidecars: bool = True,
+    answers: Answers = NO_ANSWERS,
 ) -> ImportedLog:
+    """Read a file or columns in memory into a recording; parameters and errors as `read_log`."""
+    if not isinstance(path, (str, os.PathLike)):
+        table = table_of(path)
+        mapped = find_map(column_map) if isinstance(column_map, (str, Path)) else column_map
+        known = None if note is None else read_command_note(note)
+        return settled(_by_headers(table, mapped, known, loadcell, answers=answers))
     try:
-        return import_log(
-            path, column_map=column_map, loadcell=loadcell, command=note, gear_ratio=gear_ratio,
-            sidecars=sidecars,
+        read = import_foreign(
+            Path(path), column_map, loadcell=loadcell, command=note, gear_ratio=gear_ratio,
+            sidecars=sidecars, answers=answers,
         )  # fmt: skip
+        return settled(read)
+    except QuestionError:
+        raise
     except (FormatError, InputError):
         if column_map is not None or note is not None or loadcell is not None:
             raise
@@ -159,6 +210,20 @@ def _imported(
         if recording is None:
             raise
     return ImportedLog(recording, ImportReport(str(path), "recording"), None)
+
+
+def settled(read: ForeignLog) -> ImportedLog:
+    """Return a log whose columns leave no question open.
+
+    Raises
+    ------
+    QuestionError
+        One that is open; the option that answers it is named.
+    """
+    if read.guess is not None:
+        for question in read.guess.questions:
+            raise QuestionError(f"{read.guess.source}: {question.text}")
+    return read.imported
 
 
 def as_logs(given: LogsLike) -> list[Log]:
@@ -213,6 +278,9 @@ def import_foreign(
     *,
     loadcell: str | Path | None = None,
     command: str | Path | None = None,
+    gear_ratio: float | None = None,
+    sidecars: bool = True,
+    answers: Answers = NO_ANSWERS,
 ) -> ForeignLog:
     """Read a log by a map, by its headers, or by a guess where these say too little.
 
@@ -224,6 +292,12 @@ def import_foreign(
         What the columns are.
     loadcell, command : path, optional
         Load-cell file and command note; by default those that stand beside the log.
+    gear_ratio : float, optional
+        Motor over output.
+    sidecars : bool
+        Whether files beside the log are looked for.
+    answers : Answers
+        Which drive, and which column has which role, where the guess asks.
 
     Raises
     ------
@@ -231,25 +305,52 @@ def import_foreign(
         As `import_log`; no column that could be the time.
     """
     mapped = find_map(column_map) if isinstance(column_map, (str, Path)) else column_map
+    saved = None if mapped is not None else saved_log(path, "auto")
+    if saved is not None:
+        return ForeignLog(
+            saved if command is None else replace(saved, note=read_command_note(command))
+        )
+    near_cell, near_note = find_sidecars(path) if sidecars else (None, None)
+    note_path = command or near_note
+    note = None if note_path is None else read_command_note(note_path)
+    return _by_headers(
+        read_table(path), mapped, note, loadcell or near_cell, gear_ratio=gear_ratio,
+        answers=answers,
+    )  # fmt: skip
+
+
+def _by_headers(
+    table: RawTable,
+    mapped: ColumnMap | None,
+    note: CommandNote | None,
+    loadcell: str | Path | None,
+    *,
+    gear_ratio: float | None = None,
+    answers: Answers = NO_ANSWERS,
+) -> ForeignLog:
+    """Import a table by its map, its headers or a guess; as `import_foreign`."""
 
     def read(by: ColumnMap | None) -> ImportedLog:
-        return import_log(path, column_map=by, loadcell=loadcell, command=command)
+        return import_table(table, by, note, loadcell, gear_ratio=gear_ratio)
 
     if mapped is not None:
         return ForeignLog(read(mapped), mapped)
-    try:
-        plain = read(None)
-    except FormatError:
-        plain = None
-    if plain is not None and (plain.report.file_format == "recording" or _says_enough(plain)):
-        return ForeignLog(plain)
-    guess = guess_map(read_table(path))
+    plain = None
+    if not answers.drive and not answers.roles:
+        try:
+            plain = read(None)
+        except FormatError:
+            plain = None
+        if plain is not None and _says_enough(plain):
+            return ForeignLog(plain)
+    guess = guess_map(table, drive=answers.drive, answers=answers.roles)
     try:
         by_guess = read(map_of(guess))
     except InputError as error:
         raise FormatError(
-            f"{path}: its columns were guessed, and the guess does not hold: {error}; "
-            f"elevon import {path} --guess map.toml writes it; corrected, it is given with --map"
+            f"{table.source}: its columns were guessed, and the guess does not hold: {error}; "
+            f"elevon import {table.source} --guess --out map.toml writes it; corrected, it is "
+            "given with --map"
         ) from error
     if plain is not None and len(plain.recording.roles) >= len(by_guess.recording.roles):
         return ForeignLog(plain)

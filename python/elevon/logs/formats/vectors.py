@@ -97,8 +97,12 @@ class Vectors:
         if length == 0:
             raise FormatError(f"{self.source}: the vectors are empty")
         aligned = {n: quiet(values) for n, values in self.values.items() if len(values) == length}
-        for name in self.values.keys() - aligned.keys():
-            self.pass_over(name, f"{len(self.values[name])} values, not {length}")
+        scalars = {n: repr(float(v[0])) for n, v in self.values.items() if len(v) == 1 < length}
+        for name in self.values:
+            if name in scalars:
+                self.notes.append(f"{quoted(name)} = {scalars[name]} is kept as a note")
+            elif name not in aligned:
+                self.pass_over(name, f"{len(self.values[name])} values, not {length}")
         self.limits.check_shape(self.source, length, len(aligned))
         last = [name.rpartition("/")[2] for name in aligned]
         short = {
@@ -107,7 +111,7 @@ class Vectors:
         }
         columns = {short[name]: values for name, values in aligned.items()}
         stated = {short[name]: unit for name, unit in self.units.items() if name in aligned}
-        return RawTable(self.source, columns, stated, tuple(self.notes), file_format)
+        return RawTable(self.source, columns, stated, tuple(self.notes), file_format, scalars)
 
 
 def signals_side_by_side(shape: Sequence[int]) -> bool:

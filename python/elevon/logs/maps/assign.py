@@ -117,7 +117,7 @@ def _check_some(assigned: Mapping[str, Assignment], table: RawTable) -> None:
     raise FormatError(
         f"{table.source}: {what}; columns: "
         f"{', '.join(quoted(name) for name in list(table.columns)[:12])}; say what they are in "
-        "a column map (--map; elevon import --guess writes a first one)"
+        "a column map (--map; elevon import --guess --out writes a first one)"
     )
 
 

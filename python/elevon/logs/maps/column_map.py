@@ -86,7 +86,7 @@ def drive_unit(text: str, units: Collection[str]) -> str:
     units : collection of str
         SI units that the quantity may have.
     """
-    spelt = _TABLES["spellings"].get(text.strip().lower().replace(" ", ""), text.strip())
+    spelt: str = _TABLES["spellings"].get(text.strip().lower().replace(" ", ""), text.strip())
     try:
         dimension, size = parse_unit(spelt).dimension, parse_unit(spelt).factor
     except InputError:

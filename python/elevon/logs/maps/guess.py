@@ -278,6 +278,7 @@ def guess_map(
     _headers(columns, table, answers)
     joint = assign_roles(time, _joint_candidates(table, columns), _current_like(table, columns))
     questions = asked + _settle_joint(joint, columns, answers)
+    swapped = _swapped(columns)
     motion = find_motion(time, _candidates(table, columns))
     _apply(motion, columns)
     if motion.position is not None:
@@ -285,7 +286,7 @@ def guess_map(
     questions += _counts(time, table, columns) + _units(columns)
     return Guess(
         table.source, list(columns.values()), motion.gear_ratio, motion.travel_per_turn,
-        motion.swapped, tuple(questions),
+        motion.swapped or swapped, tuple(questions),
     )  # fmt: skip
 
 
@@ -357,6 +358,17 @@ def _joint_candidates(table: RawTable, columns: Mapping[str, GuessedColumn]) -> 
         scale = parse_unit(item.unit).factor if item.unit else 1.0
         chosen.append(Candidate(name, kind, scale, whole, hint, own))
     return chosen
+
+
+def _swapped(columns: Mapping[str, GuessedColumn]) -> tuple[str, str] | None:
+    """Return motor's and output's position where the header of each names the other."""
+    motor, output = (next((n for n, c in columns.items() if c.role == r), "") for r in (
+        "motor_position", "output_position"))  # fmt: skip
+    if role_hint(motor) != "output_position" or role_hint(output) != "motor_position":
+        return None
+    columns[motor].reasons.append(f"swapped with {output!r}: it moves as the motor does")
+    columns[output].reasons.append(f"swapped with {motor!r}: it moves less")
+    return motor, output
 
 
 def _current_like(table: RawTable, columns: Mapping[str, GuessedColumn]) -> dict[str, Floats]:

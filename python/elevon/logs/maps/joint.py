@@ -20,10 +20,10 @@ from elevon.arrays import Floats
 from elevon.estimate.signals import integral
 from elevon.logs.maps.agreement import slope_and_fit
 
-#: Margin below which a role is asked for. ASSUMED: a header that says a role counts one, so that
+#: Margin below which a role is asked for. ASSUMED: a header that says a role counts 0.7, so that
 #: only what neither data nor headers settle is doubtful.
 DOUBTFUL = 0.5
-_NAMED = 1.0  # a header that suggests the role; less it where it suggests another
+_NAMED = 0.7  # a header that suggests the role; less it where it suggests another
 _OWN = 6.0  # the role's own name as header
 _FILLED = -0.05  # a role that is filled: without a relation or a header it stays empty
 _SAMPLES = 4000  # that are compared
