@@ -28,7 +28,15 @@ from elevon.logs.maps.column_map import (
     known_signals,
     parameter_key,
 )
-from elevon.logs.maps.joint import KINDS, Candidate, Joint, assign_roles, drives_of
+from elevon.logs.maps.joint import (
+    DOUBTFUL,
+    KINDS,
+    Candidate,
+    Joint,
+    assign_roles,
+    drives_of,
+    lead,
+)
 from elevon.logs.maps.motion import MotionColumns, find_motion
 from elevon.units import Unit, parse_unit
 
@@ -275,7 +283,7 @@ def guess_map(
     for role, name in answers.items():
         columns[name].role = role
         columns[name].reasons.append("as you say")
-    _headers(columns, table, answers)
+    asked += _headers(time, columns, table, answers)
     joint = assign_roles(time, _joint_candidates(table, columns), _current_like(table, columns))
     questions = asked + _settle_joint(joint, columns, answers)
     swapped = _swapped(columns)
@@ -457,15 +465,22 @@ def _time(table: RawTable, columns: Mapping[str, GuessedColumn]) -> Floats:
 
 
 def _headers(
-    columns: Mapping[str, GuessedColumn], table: RawTable, answers: Mapping[str, str]
-) -> None:
-    """Take roles other than of motion from headers; of two that suggest one, neither has it yet."""
+    time: Floats,
+    columns: Mapping[str, GuessedColumn],
+    table: RawTable,
+    answers: Mapping[str, str],
+) -> list[Question]:
+    """Take roles other than of motion from headers; return what they leave open.
+
+    Of two that suggest one role neither has it yet.
+    """
     hints = {name: role_hint(name) for name, item in columns.items() if not item.role}
     amperes = [n for n, i in columns.items() if _is_current(i) and not i.role]
     for name in amperes:
         if hints[name] not in _CURRENT_ROLES:
             wanted = re.search(_HINTS["words"]["wanted"], _plain(name)) is not None
             hints[name] = "current_ref" if wanted else "torque_current"
+    questions = _two_currents(time, table, columns, hints, amperes)
     for name, role in hints.items():
         if not role or role == "time" or role in KINDS or role in answers:
             continue
@@ -488,6 +503,34 @@ def _headers(
             columns[name].role, columns[name].unit = "torque_current", "A"
             columns[name].reasons.append("the other headers end in units: in A, not of phase a")
         _drop_odd_unit(columns[name])
+    return questions
+
+
+def _two_currents(
+    time: Floats,
+    table: RawTable,
+    columns: Mapping[str, GuessedColumn],
+    hints: dict[str, str],
+    amperes: list[str],
+) -> list[Question]:
+    """Tell current and set point apart where headers do not: the set point leads."""
+    doubtful = [n for n in amperes if hints[n] == "torque_current"]
+    if len(doubtful) != 2 or "current_ref" in hints.values():
+        return []
+    first, second = doubtful
+    pair = [table.columns[name] for name in doubtful]
+    ahead = (
+        lead(time, *pair) if all(np.isfinite(v).all() and np.ptp(v) > 0.0 for v in pair) else 0.0
+    )
+    if abs(ahead) < DOUBTFUL:
+        listed = ", ".join(quoted(name) for name in doubtful)
+        text = f"which column is the torque_current: {listed}? say --role torque_current=COLUMN"
+        return [Question("torque_current", doubtful, text)]
+    reference, measured = (first, second) if ahead > 0.0 else (second, first)
+    hints[reference] = "current_ref"
+    columns[reference].margin = columns[measured].margin = round(abs(ahead), 3)
+    columns[reference].reasons.append(f"{measured!r} follows it")
+    return []
 
 
 _CURRENT_ROLES = frozenset(

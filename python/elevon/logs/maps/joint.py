@@ -292,6 +292,16 @@ class _Terms:
         return "; ".join(said) or "the one column that is left for it"
 
 
+def lead(time: Floats, x: Floats, y: Floats) -> float:
+    """Return by how much better a signal explains another later than sooner; below 0: it follows.
+
+    Twice the tens logarithm of what is left, at most 2 in size, as the term of a command.
+    """
+    pair = [Candidate("x", "", 1.0, x), Candidate("y", "", 1.0, y)]
+    terms = _Terms(time, pair, {})
+    return float(np.clip((terms.follows(0, 1) - terms.follows(1, 0)) / 2.0, -2.0, 2.0))
+
+
 def _smoothed(values: Floats) -> Floats:
     return np.convolve(np.pad(values, 4, mode="edge"), np.full(9, 1.0 / 9.0), mode="valid")
 
