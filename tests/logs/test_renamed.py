@@ -83,18 +83,18 @@ def renamed(columns, names, order):
 def test_other_names_give_the_same_log_or_a_question(columns, shuffled):
     order = np.random.default_rng(1).permutation(len(UNITS)) if shuffled else range(len(UNITS))
     reference = read_log(renamed(columns, STYLES["own"], range(len(UNITS))))
-    asked = []
+    questioned = []
     for style, names in STYLES.items():
         try:
             log = read_log(renamed(columns, names, order))
         except QuestionError:
-            asked.append(style)
+            questioned.append(style)
             continue
         assert set(log.channels) == set(UNITS) - {"time"}, style
         assert np.array_equal(log.time, reference.time), style
         for role in reference:
             assert np.array_equal(log[role], reference[role], equal_nan=True), (style, role)
-    assert len(asked) <= 0.1 * len(STYLES), asked
+    assert len(questioned) <= 0.1 * len(STYLES), questioned
 
 
 def test_a_commanded_current_is_never_the_current(columns):

@@ -181,17 +181,17 @@ def roles_said(given: Sequence[str] | None) -> dict[str, str]:
     Raises
     ------
     InputError
-        Not of that form, or a role said twice.
+        Not of that form, or a role stated twice.
     """
-    said: dict[str, str] = {}
+    answers: dict[str, str] = {}
     for text in given or ():
         role, sign, column = text.partition("=")
         if not (role.strip() and sign and column.strip()):
             raise InputError(f"--role {text!r}: expected ROLE=COLUMN")
-        if role.strip() in said:
-            raise InputError(f"--role: {role.strip()} is said twice")
-        said[role.strip()] = column.strip()
-    return said
+        if role.strip() in answers:
+            raise InputError(f"--role: {role.strip()} is stated twice")
+        answers[role.strip()] = column.strip()
+    return answers
 
 
 def read_logs(

@@ -110,7 +110,7 @@ def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
     return [Path(p) for p in ([given] if isinstance(given, (str, os.PathLike)) else given)]
 
 
-class Beside(TypedDict):
+class Companions(TypedDict):
     """Files that stand beside a log."""
 
     loadcell: Path | None
@@ -129,13 +129,13 @@ def _read(
     read: list[ForeignLog] = []
     for path, cell, note in zip(paths, cells, texts, strict=False):
         guessed = next((log.column_map for log in read if log.guess is not None), None)
-        beside = Beside(loadcell=_path(cell), command=_path(note))
+        companions = Companions(loadcell=_path(cell), command=_path(note))
         try:
-            read.append(import_foreign(path, column_map or guessed, **beside, answers=answers))
+            read.append(import_foreign(path, column_map or guessed, **companions, answers=answers))
             settled(read[-1])
         except InputError as error:
             if column_map is None and guessed is not None:
-                read.append(import_foreign(path, **beside, answers=answers))
+                read.append(import_foreign(path, **companions, answers=answers))
                 settled(read[-1])
             elif str(path) in str(error):
                 raise

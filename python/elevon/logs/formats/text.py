@@ -224,12 +224,12 @@ class LineReader:
         if not ahead or self.delimiter is None:
             return ahead
         cells = [cell.strip().strip('[]()"') for cell in split_cells(ahead[0][1], self.delimiter)]
-        rest = [split_cells(text, self.delimiter) for _, text in ahead[1 : 1 + ROWS]]
+        rows = [split_cells(text, self.delimiter) for _, text in ahead[1 : 1 + ROWS]]
         if (
             len(cells) != len(names)
             or any(is_number(cell, comma=True) for cell in cells if cell)
-            or not rest
-            or not all(len(row) == len(names) and is_row(row) for row in rest)
+            or not rows
+            or not all(len(row) == len(names) and is_row(row) for row in rows)
             or not any(looks_like_unit(cell) for cell in cells)
         ):
             return ahead

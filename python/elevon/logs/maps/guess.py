@@ -273,7 +273,7 @@ def guess_map(
     InputError
         No such drive, no such column or role.
     """
-    table, asked = _one_drive(table, drive)
+    table, questions = _one_drive(table, drive)
     answers = _checked(answers or {}, table)
     columns = {
         name: GuessedColumn(name, unit=unit_hint(name, table.units.get(name, "")) or None)
@@ -283,9 +283,9 @@ def guess_map(
     for role, name in answers.items():
         columns[name].role = role
         columns[name].reasons.append("as you say")
-    asked += _headers(time, columns, table, answers)
+    questions += _headers(time, columns, table, answers)
     joint = assign_roles(time, _joint_candidates(table, columns), _current_like(table, columns))
-    questions = asked + _settle_joint(joint, columns, answers)
+    questions += _settle_joint(joint, columns, answers)
     swapped = _swapped(columns)
     motion = find_motion(time, _candidates(table, columns))
     _apply(motion, columns)
@@ -362,9 +362,9 @@ def _joint_candidates(table: RawTable, columns: Mapping[str, GuessedColumn]) -> 
         hint = role_hint(name)
         hint = item.role or (hint if hint in KINDS else "")
         known = name.strip().lower() in {*known_roles(), *known_signals()}
-        own = bool(item.role or (hint and (known or parameter_key(name) is not None)))
+        exact = bool(item.role or (hint and (known or parameter_key(name) is not None)))
         scale = parse_unit(item.unit).factor if item.unit else 1.0
-        chosen.append(Candidate(name, kind, scale, whole, hint, own))
+        chosen.append(Candidate(name, kind, scale, whole, hint, exact))
     return chosen
 
 

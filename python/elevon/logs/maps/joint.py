@@ -24,7 +24,7 @@ from elevon.logs.maps.agreement import slope_and_fit
 #: only what neither data nor headers settle is doubtful.
 DOUBTFUL = 0.5
 _NAMED = 0.7  # a header that suggests the role; less it where it suggests another
-_OWN = 6.0  # the role's own name as header
+_EXACT = 6.0  # the role's own name as header
 _FILLED = -0.05  # a role that is filled: without a relation or a header it stays empty
 _SAMPLES = 4000  # that are compared
 _CLOSE = 3.0  # most that one relation counts: a residual of 1e-3 of the power
@@ -61,7 +61,7 @@ class Candidate:
         Without holes.
     hint : str
         Role that the header suggests; empty for none.
-    own : bool
+    exact : bool
         Whether the header is the role's own name.
     """
 
@@ -70,7 +70,7 @@ class Candidate:
     scale: float
     values: Floats
     hint: str = ""
-    own: bool = False
+    exact: bool = False
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class _Terms:
         column = self.columns[k]
         if not column.hint:
             return 0.0
-        return (_OWN if column.own else _NAMED) * (1.0 if column.hint == role else -1.0)
+        return (_EXACT if column.exact else _NAMED) * (1.0 if column.hint == role else -1.0)
 
     def score(self, at: Mapping[str, int]) -> float:
         """Return the score of an assignment: role to column, -1 for none."""
@@ -277,7 +277,7 @@ class _Terms:
     def reason(self, role: str, at: Mapping[str, int]) -> str:
         """Return what speaks for a role, in words."""
         k = at[role]
-        said = ["its header suggests it"] if self.named(role, k) > 0.0 else []
+        reasons = ["its header suggests it"] if self.named(role, k) > 0.0 else []
         pairs = {
             "command": ("output_position", "follows it"),
             "speed_ref": ("motor_speed", "follows it"),
@@ -288,8 +288,8 @@ class _Terms:
         }  # fmt: skip
         other, text = pairs.get(role, ("", ""))
         if other and at[other] >= 0 and self._known:
-            said.append(f"{self.columns[at[other]].name!r} {text}")
-        return "; ".join(said) or "the one column that is left for it"
+            reasons.append(f"{self.columns[at[other]].name!r} {text}")
+        return "; ".join(reasons) or "the one column that is left for it"
 
 
 def lead(time: Floats, x: Floats, y: Floats) -> float:
