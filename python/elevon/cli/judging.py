@@ -290,6 +290,8 @@ def learn(
     loadcell: list[Path] | None = None,
     command: list[Path] | None = None,
     column_map: Path | None = None,
+    drive: str | None = None,
+    role: list[str] | None = None,
     settings: list[str] | None = None,
     seed: int = 0,
     force: bool = False,
@@ -325,7 +327,7 @@ def learn(
         else:
             paths = common.without_companions(logs)
             known = None if labels is None else read_labels(labels, paths)
-            read = common.read_logs(paths, column_map, loadcell, command)
+            read = common.read_logs(paths, column_map, loadcell, command, drive=drive, role=role)
             result = run(read, known, **options, progress=advance)
     path = result.save(out, force=force)
     return Answer({"file": path, **result.to_dict()}, lambda: _print_learned(result, path))
