@@ -508,15 +508,15 @@ class LineReader:
         data = np.frombuffer(self.values, dtype=np.float64).reshape(-1, len(names))
         if not self.ended:
             self.notes.append("the last line has no line end: its last number may be cut short")
-        kept = [k for k in range(len(names)) if k not in self.text]
+        numeric = [k for k in range(len(names)) if k not in self.text]
         for k, seen in self.text.items():
             listed = ", ".join(quoted(word) for word in list(seen)[:5])
             more = ", ..." if len(seen) > 5 else ""
             self.notes.append(
                 f"column {quoted(names[k])} holds text and is kept as a note: {listed}{more}"
             )
-        columns, units = named_columns([names[k] for k in kept], data[:, kept])
-        labels = dict(zip((names[k] for k in kept), columns, strict=True))
+        columns, units = named_columns([names[k] for k in numeric], data[:, numeric])
+        labels = dict(zip((names[k] for k in numeric), columns, strict=True))
         for name, unit in self.units_row.items():
             if unit and name in labels:
                 units.setdefault(labels[name], unit)
