@@ -309,7 +309,7 @@ def _one_drive(table: RawTable, drive: str | None) -> tuple[RawTable, list[Quest
         return table, []
     chosen = drive or drives[0]
     others = tuple(d for d in drives if d != chosen)
-    kept = {
+    chosen_columns = {
         name: values
         for name, values in table.columns.items()
         if not any(re.match(rf"{re.escape(other)}[ _.:/-]", name) for other in others)
@@ -317,7 +317,7 @@ def _one_drive(table: RawTable, drive: str | None) -> tuple[RawTable, list[Quest
     question = Question(
         "drive", drives, f"several drives stand in the file: {', '.join(drives)}; say --drive NAME"
     )
-    return replace(table, columns=kept), [] if drive else [question]
+    return replace(table, columns=chosen_columns), [] if drive else [question]
 
 
 def _checked(answers: Mapping[str, str], table: RawTable) -> Mapping[str, str]:
