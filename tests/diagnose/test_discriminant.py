@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from elevon.diagnose.learning.classify import share_interval
+
 from elevon.diagnose.learning.discriminant import Discriminant
 from elevon.errors import InputError
 
