@@ -170,9 +170,13 @@ def _show_saved(values: Values, _result: Any) -> None:
     answer(f"the fixed order that proves best here: {best['tests']:.2f} tests: {best['order']}")
 
 
-def _show_foreign(values: Values, _result: Any) -> None:
-    columns = ("density", "form", "method", "lives", "accuracy", "coverage", "width", "off_law")
-    print_columns(values["rows"], columns, "remaining lives, 50 to 90 % of life")
+def _show_judged(values: Values, _result: Any) -> None:
+    columns = ("group", "method", "lives", "coverage90", "below1", "crps", "accuracy", "width")
+    print_columns(values["rows"], columns, "remaining lives")
+    for name, row in values["plan"].items():
+        if isinstance(row, dict):
+            text = ", ".join(f"{key} {value:.3g}" for key, value in row.items())
+            answer(f"fleet, {name}: {text} (of a unit and a year)")
 
 
 def _show_lives(values: Values, result: Any) -> None:
@@ -194,7 +198,7 @@ _STEPS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "fault-limits": {"prepare": _check_table, "finish": _save_table},
     "next-test": {"show": _show_saved},
     "prognosis": {"show": _show_lives},
-    "foreign": {"show": _show_foreign},
+    "lives": {"show": _show_judged},
 }
 
 app = typer.Typer(

@@ -21,6 +21,7 @@ from elevon.errors import NotActingWarning as NotActingWarning
 from elevon.logs.read import read_log as read_log
 from elevon.nexttest.door import next_test as next_test
 from elevon.prognose.door import fleet as fleet
+from elevon.prognose.door import learn_growth as learn_growth
 from elevon.prognose.door import next_inspection as next_inspection
 from elevon.prognose.door import predict as predict
 from elevon.recording import Channel as Channel

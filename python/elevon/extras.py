@@ -17,6 +17,7 @@ EXTRAS = {
     "fmu": ("fmpy",),
     "gym": ("gymnasium",),
     "learn": ("sklearn",),
+    "lives": ("lifelines",),
     "live": ("starlette", "uvicorn", "websockets"),
     "optimise": ("pymoo",),
     "progpy": ("progpy",),
@@ -25,7 +26,7 @@ EXTRAS = {
 }
 
 #: Extras that ``all`` leaves out: of studies and tests alone, under another licence, for queries.
-APART = frozenset({"fmu", "optimise", "progpy", "query", "sampling"})
+APART = frozenset({"fmu", "lives", "optimise", "progpy", "query", "sampling"})
 
 
 def missing_package(error: ModuleNotFoundError) -> str | None:

@@ -31,6 +31,7 @@ _KINDS = {
     "effects": "elevon.analysis.effects:Effects",
     "examination": "elevon.doctor.answer:Examination",
     "fleet": "elevon.prognose.fleet:FleetPlan",
+    "growth": "elevon.prognose.fleet_growth:FleetGrowth",
     "linear-model": "elevon.response.linear:LinearModel",
     "loop-response": "elevon.response.loop:LoopResponse",
     "monitoring": "elevon.diagnose.monitor.answer:Monitoring",

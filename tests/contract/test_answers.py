@@ -86,6 +86,9 @@ ANSWERS = {
                 r"(remain|No end of life)", (), True),
     "next-inspection": (("history", *ROTARY, "--mission", "mission.toml", "--particles", "500"),
                         r"(Inspect (now|within)|No end of life)", (), True),
+    "learn-growth": (("history", *ROTARY, "--mission", "mission.toml", "--censored", "lives.csv",
+                      "--out", "growth.json"),
+                     r"^\d+ units, \d+ failed; .* -> growth\.json$", (), True),
     "fleet": (("history", *ROTARY, "--mission", "mission.toml"), r"visit\(s\) for 1 units", (),
               True),
     "learn": ((*(f"{name}/log.csv" for name in "abcdef"), "--labels", "labels.csv",
@@ -165,3 +168,5 @@ def _history(folder):
 
     history(folder / "history", serial=["one"] * 4)
     (folder / "mission.toml").write_text(tomlkit.dumps(MISSION))
+    rows = "".join(f"unit {k},{1000 + 137 * k},{k % 3 > 0:d}\n" for k in range(9))
+    (folder / "lives.csv").write_text(f"unit,use,failed\n{rows}")

@@ -96,7 +96,9 @@ def test_growth_is_a_gamma_process_whatever_the_steps():
     ends = []
     for steps in (1, 20):
         rng = np.random.default_rng(steps)
-        units = unit.to(unit.start(40_000, rng), 500.0, rng, steps=steps)
+        units = unit.start(40_000, rng)
+        for _ in range(steps):
+            units = unit.advance(units, 500.0 / steps, rng)
         ends.append(units.damage[:, 0])
     for damage in ends:
         assert damage.mean() == pytest.approx(0.5, rel=0.005)

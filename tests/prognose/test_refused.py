@@ -114,9 +114,9 @@ def lives(*remaining):
 
 def test_no_visit_is_planned_where_no_end_is_in_sight_nor_after_the_end():
     """One sure to end at 1,000; one whose end nobody sees; one that has failed already."""
-    units = {"a": lives(*[1000.0] * 20), "b": lives(*[np.inf] * 15, *[4e5] * 5),
+    units = {"a": lives(*[1000.0] * 20), "b": lives(*[np.inf] * 20),
              "c": lives(*[0.0] * 20)}  # fmt: skip
-    plan = plan_fleet(units, Costs(1.0, 0.0, 1.0))
+    plan = plan_fleet(units, Costs(1.0, 2000.0, 1.0))
     rows = {row["unit"]: row for row in plan.table}
     assert rows["b"]["visit"] is None
     assert any(text.startswith("b: no visit is planned") for text in plan.findings)

@@ -1,16 +1,19 @@
-"""`elevon predict`, `elevon next-inspection` and `elevon fleet`: how long units will last."""
+"""`elevon predict`, `next-inspection`, `fleet` and `learn-growth`: how long units will last."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from elevon.cli import common
 from elevon.cli.output import answer, listed, print_table
-from elevon.cli.shell import REPORT, printer
+from elevon.cli.shell import REPORT, Answer, DoorCall, command, printer
 from elevon.number_text import count_text
 
 if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
     from elevon.prognose.fleet import FleetPlan
+    from elevon.prognose.fleet_growth import FleetGrowth
     from elevon.prognose.next_inspection import NextInspection
 
 _RUNS = "model runs"
@@ -53,3 +56,43 @@ def fleet(plan: FleetPlan) -> None:
     answer(plan.headline)
     print_table(plan.HEADINGS, plan.cells(), title=f"{plan.unit} from now")
     listed(plan.findings)
+
+
+@command(None, "strict", door="elevon.prognose.door:learn_growth", working="learning growth")
+def learn_growth(call: DoorCall, *, out: Path, force: bool = False) -> Answer:
+    """Learn growth, its spread from unit to unit and lives from a fleet's histories.
+
+    Parameters
+    ----------
+    out : Path
+        Growth to write (JSON).
+    """
+    common.check_outputs([out], force=force)
+    result = call()
+    path = result.save(out, force=force)
+    return Answer({"file": str(path), **result.to_dict()}, lambda: _learned(result, path))
+
+
+def _learned(result: FleetGrowth, path: Path) -> None:
+    answer(f"{result.headline} -> {path}")
+    print_table(
+        ("fault", "units", "follows the law", "median life", "spread", "drift"),
+        [
+            (
+                key, str(item.units), f"{item.trust:.2f}", f"{item.life:.4g}",
+                f"{item.spread:.2f}", "{:.2f} to {:.2f}".format(*item.free.drift),
+            )
+            for key, item in result.growth.items()
+        ],
+    )  # fmt: skip
+    effects = [
+        (key, name, f"{effect:+.3g}")
+        for key, item in result.growth.items()
+        for name, effect in item.covariates.items()
+    ]
+    if result.lives is not None:
+        pairs = zip(result.lives.names[1:], result.lives.coefficients[1:], strict=True)
+        effects += [("lives", name, f"{value:+.3g}") for name, value in pairs]
+    if effects:
+        print_table(("of", "covariate", "adds to the logarithm"), effects)
+    listed(result.findings)

@@ -28,7 +28,10 @@ from elevon.option import Option
 SHARED: Mapping[str, Option] = {
     "logs": Option(metavar="LOG", help="Drive logs."),
     "folder": Option(metavar="DIR", help="The campaign's folder."),
-    "history": Option(metavar="HISTORY", help="Folder of inspections: diagnoses or logs (JSON)."),
+    "history": Option(
+        metavar="HISTORY",
+        help="Folder of inspections (JSON); with --limit a CSV of measurements.",
+    ),
     "actuator": Option(
         metavar="ACTUATOR", complete="actuators",
         help="Name of an actuator file (elevon list actuators), or a file.",

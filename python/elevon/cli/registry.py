@@ -56,7 +56,7 @@ _MODULES = {
     "recordings": ("import:import_", "plot", "features"),
     "judging": ("doctor", "calibrate", "validate", "diagnose", "learn", "next-test"),
     "campaign": ("campaign:app", "dataset:datasets"),
-    "lives": ("predict", "next-inspection", "fleet"),
+    "lives": ("predict", "next-inspection", "fleet", "learn-growth"),
     "elsewhere": ("export", "safety", "live:live_bench", "demo"),
 }
 

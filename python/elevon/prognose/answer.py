@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 
+from elevon.number_text import count_text
 from elevon.plain import STORED, WORKING, Plain, in_unit, key
 from elevon.prognose.future import Future
 from elevon.results import Result
@@ -36,7 +37,7 @@ class KnownFault(Plain):
     growing : float
         Probability that it grows; the factor is that of the futures in which it does.
     growth : mapping of str to float
-        Probability of each way of growth: the law's, and those of no physics.
+        Probability that it grows by the law, and that its rate is free.
     """
 
     kind: str
@@ -50,6 +51,11 @@ class KnownFault(Plain):
     inspections: int
     growing: Annotated[float, key("p_growing")] = 1.0
     growth: Annotated[Mapping[str, float], key("p_growth")] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """``KIND@PLACE``."""
+        return f"{self.kind}@{self.place}"
 
 
 @dataclass(frozen=True)
@@ -91,6 +97,89 @@ class OffLaw(Plain):
         )
 
 
+RISK = 0.01
+"""Probability of failing before the next inspection that an answer accepts without being told."""
+_OVER = 0.5  # probability of having failed from which a unit is replaced rather than looked at
+
+
+@dataclass(frozen=True)
+class NextAction(Plain):
+    """What to do next.
+
+    Attributes
+    ----------
+    kind : str
+        ``inspect``; ``replace``: it has probably failed; ``none``: no end of life is in sight.
+    within : float or None
+        Use from now on until when; None where nothing is to be done.
+    unit : str
+        Of use.
+    """
+
+    kind: Literal["inspect", "replace", "none"]
+    within: float | None
+    unit: str
+
+    @property
+    def text(self) -> str:
+        """In words, to begin an answer with."""
+        name = self.kind.upper()
+        if self.within is None:
+            return "NO INSPECTION is due by the risk accepted."
+        if self.within <= 0.0:
+            return f"{name} now."
+        return f"{name} within {count_text(self.within)} {self.unit}."
+
+
+@dataclass(frozen=True)
+class Branch(Plain):
+    """Remaining life where something that is not certain is true.
+
+    Attributes
+    ----------
+    what : str
+        What is true in it.
+    probability : float
+        Of it.
+    median : float
+        Of its remaining life; infinite where no end is in sight.
+    interval : (float, float)
+        Of `level`.
+    level : float
+        Of the interval.
+    unit : str
+        Of use.
+    """
+
+    what: str
+    probability: float
+    median: Annotated[float, STORED]
+    interval: Annotated[tuple[float, float], STORED]
+    level: Annotated[float, STORED]
+    unit: Annotated[str, STORED]
+
+    COMPUTED: ClassVar = ("rul",)
+
+    @property
+    def rul(self) -> dict[str, object]:
+        """Remaining useful life as `Prognosis.rul`."""
+        return life_of(self.median, self.interval, self.level, self.unit)
+
+
+def life_of(
+    median: float, interval: tuple[float, float], level: float, unit: str
+) -> dict[str, object]:
+    """Return a remaining life as answers write it; null and `censored`: no end in sight."""
+    low, high = (_number(end) for end in interval)
+    return {
+        "median": _number(median),
+        "interval": [low, high],
+        "level": level,
+        "unit": unit,
+        "censored": None in {_number(median), low, high},
+    }
+
+
 @dataclass(frozen=True)
 class Prognosis(Result):
     """Remaining useful life of one unit.
@@ -119,6 +208,8 @@ class Prognosis(Result):
         Time of ``tables``, ``updates``, ``prediction``.
     off_law : tuple of OffLaw
         Faults whose last diagnoses, or all, contradict the law, with the greatest deviation.
+    branches : tuple of Branch
+        Remaining lives where what is not certain is true, and where it is not; else one.
     horizons : tuple of float
         N of `p_survive`; empty: round ones.
     page : callable or None
@@ -138,6 +229,7 @@ class Prognosis(Result):
         default_factory=dict, compare=False
     )
     off_law: tuple[OffLaw, ...] = ()
+    branches: tuple[Branch, ...] = ()
     horizons: Annotated[tuple[float, ...], STORED] = ()
     page: Annotated[Callable[[Prognosis, str | None], Report] | None, WORKING] = field(
         default=None, compare=False, repr=False
@@ -146,6 +238,7 @@ class Prognosis(Result):
     KIND: ClassVar = "prognosis"
     COMPUTED: ClassVar = (
         "status",
+        "action",
         "rul",
         "p_survive",
         "first_requirement",
@@ -161,10 +254,18 @@ class Prognosis(Result):
 
     @property
     def rul(self) -> dict[str, object]:
-        """Remaining useful life: median, interval and its level, unit; null: no end in sight."""
-        ends = [_number(end) for end in self.interval]
-        median = _number(self.median)
-        return {"median": median, "interval": ends, "level": self.level, "unit": self.unit}
+        """Remaining useful life of all branches together; null and `censored`: no end in sight."""
+        return life_of(self.median, self.interval, self.level, self.unit)
+
+    @property
+    def action(self) -> NextAction:
+        """What to do next, at a risk of `RISK`."""
+        if self.survives(0.0) <= 1.0 - _OVER:
+            return NextAction("replace", 0.0, self.unit)
+        within = self.quantile(RISK)
+        if not math.isfinite(within):
+            return NextAction("none", None, self.unit)
+        return NextAction("inspect", within, self.unit)
 
     @property
     def p_survive(self) -> list[tuple[float, float]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError, RangeError
+from elevon.number_text import count_text
 from elevon.plain import STORED, WORKING, Plain, key
 from elevon.prognose.answer import Prognosis
 from elevon.results import Result
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 
     from elevon.report import Report
 
-_NEVER = 1e30  # a cost that no plan takes
 _INSTANTS = 400  # at which a visit may be, of each unit's remaining life
+_MOST = 6000  # instants of all units together
+_SEEN = 0.95  # of the futures with an end, that the horizon holds
+_FAILED = 0.5  # probability of having failed from which a unit has failed
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,13 @@ class FleetPlan(Result):
     units : mapping of str to Prognosis
         The fleet.
     alone : mapping of str to float
-        When each unit would be done by itself; without those of no end in sight.
+        When each unit would be done by itself; without those that need no visit.
     visits : tuple of Visit
         Together.
     cost, cost_alone : float
-        Expected cost of both, all units.
+        Expected cost of both until the horizon, all units.
+    horizon : float
+        Use from now on that costs are counted over.
     visit_cost : float or None
         Of one visit; shown on the page.
     """
@@ -82,6 +87,7 @@ class FleetPlan(Result):
     visits: tuple[Visit, ...]
     cost: float
     cost_alone: float
+    horizon: float
     visit_cost: Annotated[float | None, WORKING] = None
 
     HEADINGS: ClassVar = ("unit", "remain", "90 %", "alone at", "visit at", "failed before")
@@ -156,8 +162,9 @@ class FleetPlan(Result):
     def findings(self) -> list[str]:
         """What each unit's prediction must be read with, its name before it."""
         out = [
-            f"{name}: no visit is planned: no end of its life is in sight in half of the futures"
-            for name in self.units
+            f"{name}: no visit is planned in the next {count_text(self.horizon)} {self.unit}: "
+            f"it fails in them with a probability of {1.0 - item.survives(self.horizon):.2g}"
+            for name, item in self.units.items()
             if self.visit_of(name) is None
         ]
         return out + [f"{n}: {text}" for n, item in self.units.items() for text in item.findings]
@@ -167,11 +174,19 @@ def _use_text(value: float | None) -> str:
     return "no end in sight" if value is None else f"{value:.0f}"
 
 
-def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
-    """Choose the visits of least expected cost.
+def plan_fleet(
+    units: Mapping[str, Prognosis],
+    costs: Costs,
+    *,
+    risk: float | None = None,
+    horizon: float | None = None,
+) -> FleetPlan:
+    """Choose the visits of least expected cost over a horizon.
 
-    All units are used alike from now on. Units are sorted by when they would be done alone; a
-    visit takes neighbours in that order, and the best split is found exactly (dynamic programming).
+    All units are used alike from now on. A unit that has failed is done now. The others are sorted
+    by when they would be done alone; a visit takes neighbours in that order, and the best split is
+    found exactly (dynamic programming). A unit that is cheaper left alone until the horizon gets no
+    visit.
 
     Parameters
     ----------
@@ -179,69 +194,141 @@ def plan_fleet(units: Mapping[str, Prognosis], costs: Costs) -> FleetPlan:
         Serial number to prediction, one unit of use for all.
     costs : Costs
         What is balanced.
+    risk : float, optional
+        Probability of failing before its visit that no unit may exceed.
+    horizon : float, optional
+        Use from now on that costs are counted over; default: 95 % of the ends in sight lie in it.
 
     Raises
     ------
     InputError
         No unit, or several units of use.
+    RangeError
+        A risk outside 0 to 1, a horizon that is not above 0.
     """
     if not units:
         raise InputError("a fleet needs at least one unit")
     kinds = {item.unit for item in units.values()}
     if len(kinds) > 1:
         raise InputError(f"the fleet is counted in several units: {', '.join(sorted(kinds))}")
-    ending = {name: item for name, item in units.items() if np.isfinite(item.median)}
-    instants = _instants(ending.values())
-    table = {name: _expected(item, instants, costs) for name, item in ending.items()}
-    alone = {name: float(instants[cost.argmin()]) for name, cost in table.items()}
-    order = sorted(ending, key=lambda name: alone[name])
-    visits, cost = _grouped(order, table, instants, costs.visit)
-    single = sum(float(c.min()) for c in table.values()) + costs.visit * len(ending)
-    return FleetPlan(next(iter(kinds)), units, alone, visits, cost, single, costs.visit)
+    if risk is not None and not 0.0 < risk < 1.0:
+        raise RangeError(f"risk {risk:g} is not between 0 and 1")
+    far = _horizon(units.values()) if horizon is None else horizon
+    if not (np.isfinite(far) and far > 0.0):
+        raise RangeError(f"horizon {far:g} must be a finite number above 0")
+    failed = [name for name, item in units.items() if item.survives(0.0) <= 1.0 - _FAILED]
+    instants = _instants(units.values(), far)
+    tables = {
+        name: _expected(item, instants, costs, far, risk)
+        for name, item in units.items()
+        if name not in failed
+    }
+    left = {name: costs.late * (1.0 - units[name].survives(far)) for name in tables}
+    due = [name for name, cost in tables.items() if _due(cost, left[name], costs.visit, risk)]
+    alone = dict.fromkeys(failed, 0.0) | {
+        name: float(instants[tables[name].argmin()]) for name in due
+    }
+    order = sorted(due, key=lambda name: alone[name])
+    visits, cost = _grouped(order, tables, instants, costs.visit, failed)
+    rest = sum(value for name, value in left.items() if name not in due)
+    single = sum(float(tables[name].min()) + costs.visit for name in due)
+    return FleetPlan(
+        next(iter(kinds)),
+        units,
+        alone,
+        visits,
+        cost + rest,
+        single + rest + costs.visit * len(failed),
+        far,
+        costs.visit,
+    )
 
 
-def _instants(units: Iterable[Prognosis]) -> Floats:
+def _horizon(units: Iterable[Prognosis]) -> float:
+    """Return a use in which nearly all ends of each unit lie that are in sight."""
+    far = 1.0
+    for item in units:
+        ends = item.future.remaining
+        known = ends[np.isfinite(ends)]
+        far = max(far, float(np.quantile(known, _SEEN)) if len(known) else far)
+    return far
+
+
+def _instants(units: Iterable[Prognosis], far: float) -> Floats:
     """Return when a visit may be: as finely as each unit's life asks, one that ends soon, too."""
-    ends = [max(float(np.quantile(_finite(item), 0.95)), 1.0) for item in units]
-    return np.unique(np.concatenate([np.linspace(0.0, end, _INSTANTS) for end in [*ends, 1.0]]))
+    ends = []
+    for item in units:
+        lives = np.minimum(item.future.remaining, far)
+        ends += [float(np.quantile(lives, share)) for share in (0.02, 0.5, 0.95)]
+    ends = [min(max(end, 1.0), far) for end in (*ends, 1.0, far)]
+    count = min(max(_MOST // len(set(ends)), 8), _INSTANTS)
+    return np.unique(np.concatenate([np.linspace(0.0, end, count) for end in set(ends)]))
 
 
-def _finite(item: Prognosis) -> Floats:
-    """Return remaining lives; those without end in sight count as the longest that has one."""
-    lives = item.future.remaining
-    known = lives[np.isfinite(lives)]
-    return np.where(np.isfinite(lives), lives, known.max(initial=0.0))
+def _expected(
+    item: Prognosis, instants: Floats, costs: Costs, far: float, risk: float | None
+) -> Floats:
+    """Return the expected cost of doing a unit at each instant, shape (t,).
 
-
-def _expected(item: Prognosis, instants: Floats, costs: Costs) -> Floats:
-    """Expected cost of doing a unit at each instant, shape (t,); one that has failed waits not."""
-    lives = np.sort(_finite(item))
-    failed = np.searchsorted(lives, instants, side="left") / len(lives)
-    left = np.append(np.cumsum(lives[::-1])[::-1], 0.0)[np.searchsorted(lives, instants)]
-    lost = left / len(lives) - (1.0 - failed) * instants
+    Life beyond the horizon is not thrown away by a visit. Instants at which the risk is exceeded
+    cost as the last that keeps it, and the failures besides: no plan takes them.
+    """
+    lives = np.sort(np.minimum(item.future.remaining, far))
+    count = len(lives)
+    before = np.searchsorted(lives, instants, side="left")
+    failed = np.searchsorted(np.sort(item.future.remaining), instants, side="left") / count
+    left = np.append(np.cumsum(lives[::-1])[::-1], 0.0)[before]
+    lost = left / count - (1.0 - before / count) * instants
     cost = costs.early * lost + costs.late * failed
-    over = item.median <= 0.0
-    return np.asarray(np.where(over & (instants > 0.0), _NEVER, cost))
+    if risk is None:
+        return np.asarray(cost)
+    kept = failed <= risk
+    last = int(np.flatnonzero(kept)[-1]) if kept.any() else 0
+    return np.asarray(np.where(np.arange(len(instants)) <= last, cost, np.inf))
+
+
+def _due(cost: Floats, left: float, visit: float, risk: float | None) -> bool:
+    """Return whether a visit within the horizon is worth it, or asked for by the risk."""
+    if risk is not None and not np.isfinite(cost[-1]):
+        return True
+    return float(cost.min()) + visit < left
 
 
 def _grouped(
-    order: Sequence[str], table: Mapping[str, Floats], instants: Floats, visit: float
+    order: Sequence[str],
+    table: Mapping[str, Floats],
+    instants: Floats,
+    visit: float,
+    failed: Sequence[str],
 ) -> tuple[tuple[Visit, ...], float]:
-    """Split the order into visits; the least cost of the first j units for each j."""
-    rows = np.array([table[name] for name in order])
-    sums = np.vstack((np.zeros(len(instants)), np.cumsum(rows, axis=0)))
-    best, since = [0.0], [0]
+    """Split the order into visits; the least cost of the first j units for each j.
+
+    Where units have failed there is a visit now in any case, which the first ones may join.
+    """
+    rows = np.array([table[name] for name in order]).reshape(len(order), len(instants))
+    best, since, at = [visit if failed else 0.0], [0], [0.0]
     for j in range(1, len(order) + 1):
-        costs = [best[i] + visit + float((sums[j] - sums[i]).min()) for i in range(j)]
-        since.append(int(np.argmin(costs)))
-        best.append(min(costs))
+        options = []
+        together = np.zeros(len(instants))
+        for i in range(j - 1, -1, -1):
+            together = together + rows[i]
+            options.append((best[i] + visit + float(together.min()), i, together.argmin()))
+        if failed:
+            options.append((visit + float(rows[:j, 0].sum()), -1, 0))
+        cost, first, instant = min(options)
+        best.append(cost)
+        since.append(first)
+        at.append(float(instants[instant]))
     out: list[Visit] = []
-    j = len(order)
+    j, now = len(order), list(failed)
     while j > 0:
         i = since[j]
-        use = float(instants[(sums[j] - sums[i]).argmin()])
-        out.append(Visit(use, tuple(order[i:j])))
+        if i < 0:
+            now += order[:j]
+            break
+        out.append(Visit(at[j], tuple(order[i:j])))
         j = i
+    out += [Visit(0.0, tuple(now))] if now else []
     return tuple(reversed(out)), best[-1]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ from elevon.errors import InputError
 from elevon.plain import Plain
 from elevon.prognose.mission import Usage
 from elevon.prognose.observation import governing
-from elevon.prognose.process import Process, UnitPopulation
+from elevon.prognose.process import ONSET, Process, UnitPopulation
 from elevon.prognose.requirement import SEVERITY
 
 MODEL_ERROR = 0.008
@@ -23,12 +23,12 @@ LASTING = 0.5
 """Share of the square of `MODEL_ERROR` that a unit keeps as its faults grow, so that what is
 measured early says it of the end. ASSUMED; in three lives of the histories the error changed by
 0.5 % along the life, about a mean of as much and more."""
-_STEP = 0.02  # of the way to the greatest severity, for the fastest tenth of the units alive
-_FIRST = 0.5  # of a step is the first one: of a new unit, dormant faults may begin behind it
-_MOST_STEPS = 1500
-_COURSE = 3  # steps from one point of the severities' course to the next
-_FARTHEST = 1e7  # repetitions: beyond, no end of life is in sight
-_FAR = 20.0  # times the median of the ends: the same
+HORIZON = 1e7
+"""Repetitions beyond which no end of life is in sight."""
+_STEP = 0.02  # of the way from new to the end of life, that each unit goes in one step
+_LIFE, _LATER = 0.1, 0.15  # of a life, and of the use since the prediction: longest step
+_MOST_STEPS = 600
+_POINTS = 40  # of the severities' course
 _QUANTILES = (0.05, 0.5, 0.95)
 
 
@@ -86,28 +86,26 @@ def look_ahead(
     model_error : float
         See `MODEL_ERROR`; one of each unit and requirement.
     course : bool
-        Whether the severities' course is kept, which takes a sixth of the time; else it is where
-        they stand now.
+        Whether the severities' course is kept; else it is where they stand now.
     """
     off = _model_errors(process, units, model_error, rng)
     load = usage.load * np.exp(usage.load_spread * rng.standard_normal(len(units)))
-    fleet = _Fleet(process, units, load, off)
-    at, courses = [units.usage], [_quantiles(process, fleet.damage)]
-    for number in range(_MOST_STEPS):
-        if fleet.done(units.usage):
+    fleet = _Fleet(process, units, load, off, rng)
+    uses, damages = [fleet.usage.copy()], [fleet.damage.copy()]
+    for _ in range(_MOST_STEPS):
+        if not fleet.alive:
             break
-        fleet.use(1.0 if number else _FIRST, rng)
-        if course and number % _COURSE == 0:
-            at.append(fleet.usage)
-            courses.append(_quantiles(process, fleet.damage))
-    if course and at[-1] < fleet.usage:
-        at.append(fleet.usage)
-        courses.append(_quantiles(process, fleet.damage))
-    return Future(units.usage, fleet.end, fleet.first, np.array(at), np.array(courses))
+        fleet.use(rng)
+        if course:
+            uses.append(fleet.usage.copy())
+            damages.append(fleet.damage.copy())
+    at = _times(fleet.end - units.usage, units.usage) if course else np.array([units.usage])
+    courses = _courses(process, np.array(uses), np.array(damages), at)
+    return Future(units.usage, fleet.end, fleet.first, at, courses)
 
 
 class _Fleet:
-    """Units in use, and the ends of those that have failed.
+    """Units in use, each on a clock of its own, and the ends of those that have failed.
 
     Parameters
     ----------
@@ -117,13 +115,25 @@ class _Fleet:
         Factor on the loads of each unit.
     off : ndarray, shape (m, n)
         Of `_model_errors`.
+    rng : Generator
+        Of chance: when faults begin that are not there yet.
     """
 
-    def __init__(self, process: Process, units: UnitPopulation, load: Floats, off: Floats) -> None:
+    def __init__(
+        self, process: Process, units: UnitPopulation, load: Floats, off: Floats,
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
         count = len(units)
         self.process, self.now, self._load, self._off = process, units, load, off
         self.end, self.first = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
-        self.damage = units.damage.copy()
+        self.damage, self.usage = units.damage.copy(), np.full(count, units.usage)
+        self._new = np.array([law.start for law in process.laws])
+        # A fault that is not there begins at a rate for each e-fold of use; in a new unit, never.
+        folds = rng.standard_exponential(units.active.shape) / ONSET
+        self._onset = np.where(units.active, 0.0, units.usage * np.exp(np.minimum(folds, 600.0)))
+        self._onset[~units.active & (units.usage <= 0.0)] = np.inf
+        self._since, self._last = units.usage, units.usage + HORIZON
+        self._shortest = _LIFE * min(float(life[0]) for life in process.lives)
         self._alive = np.arange(count)
         reserve, self._drivers = self._state(units.damage)
         failed = reserve.min(axis=0) < 0.0
@@ -131,28 +141,42 @@ class _Fleet:
         self._leave(failed, reserve)
 
     @property
-    def usage(self) -> float:
-        """Of those that are still in use."""
-        return self.now.usage
+    def alive(self) -> bool:
+        """Whether any unit has neither failed nor been used beyond the horizon."""
+        return len(self._alive) > 0
 
-    def done(self, since: float) -> bool:
-        """Whether all have failed, or the rest has no end in sight."""
-        return not len(self._alive) or _out_of_sight(self.usage - since, self.end - since)
-
-    def use(self, share: float, rng: np.random.Generator) -> None:
-        """Go on by a share of the step that the growth of the fastest asks for."""
+    def use(self, rng: np.random.Generator) -> None:
+        """Let each unit go on by a step of its own life."""
         load, now = self._load[self._alive], self.now
         rate = self.process.rate(now, now.damage, load, self._drivers)
-        step = _step(self.process, rate) * share
+        with np.errstate(divide="ignore"):
+            step = np.min(_STEP * self.process.range / rate, axis=1)
+        before = self.usage[self._alive]
+        # Rates that wander do so with use, however slowly the fault grows.
+        step = np.minimum(step, np.maximum(self._shortest, _LATER * (before - self._since)))
+        if not now.active.all():
+            waiting = np.where(now.active, np.inf, self._onset[self._alive] - before[:, None])
+            step = np.minimum(step, waiting.min(axis=1))
+        step = np.minimum(step, self._last - before)
         self.now = self.process.advance(now, step, rng, load, rate)
+        self.usage[self._alive] = before + step
+        if not now.active.all():
+            self._begin()
         after, self._drivers = self._state(self.now.damage)
         failed = after.min(axis=0) < 0.0
         if failed.any():
             part, which = crossing(self._reserve[:, failed], after[:, failed])
             gone = self._alive[failed]
-            self.end[gone], self.first[gone] = now.usage + part * step, which
+            self.end[gone], self.first[gone] = before[failed] + part * step[failed], which
+            self.usage[gone] = self.end[gone]
         self.damage[self._alive] = self.now.damage
-        self._leave(failed, after)
+        self._leave(failed | (self.usage[self._alive] >= self._last), after)
+
+    def _begin(self) -> None:
+        """Let faults begin whose time has come."""
+        begun = ~self.now.active & (self._onset[self._alive] <= self.usage[self._alive, None])
+        damage = np.where(begun & (self.now.damage <= 0.0), self._new, self.now.damage)
+        self.now = replace(self.now, active=self.now.active | begun, damage=damage)
 
     def _state(self, damage: Floats) -> tuple[Floats, dict[str, Floats]]:
         """Return reserves, shape (m, a), and exposure of those that are still in use."""
@@ -160,12 +184,45 @@ class _Fleet:
         reserve, drivers = self.process.response.state(severity, self._load[self._alive])
         return reserve + self._off[:, self._alive], drivers
 
-    def _leave(self, failed: npt.NDArray[np.bool_], reserve: Floats) -> None:
-        """Take units that have failed out of use."""
-        self._alive, self._reserve = self._alive[~failed], reserve[:, ~failed]
-        if failed.any():
-            self.now = self.now.picked(np.flatnonzero(~failed))
-            self._drivers = {name: x[~failed] for name, x in self._drivers.items()}
+    def _leave(self, gone: npt.NDArray[np.bool_], reserve: Floats) -> None:
+        """Take units out of use that have failed or reached the horizon."""
+        self._alive, self._reserve = self._alive[~gone], reserve[:, ~gone]
+        if gone.any():
+            self.now = self.now.picked(np.flatnonzero(~gone))
+            self._drivers = {name: x[~gone] for name, x in self._drivers.items()}
+
+
+def _times(remaining: Floats, since: float) -> Floats:
+    """Return uses at which the severities' course is kept: as densely as lives end."""
+    finite = remaining[np.isfinite(remaining)]
+    if not len(finite):
+        return since + np.linspace(0.0, HORIZON, _POINTS)
+    ends = np.quantile(finite, np.linspace(0.0, 0.99, _POINTS // 2))
+    even = np.linspace(0.0, max(float(ends[-2]), 1e-9), _POINTS // 2 + 1)
+    return np.asarray(since + np.unique(np.concatenate((even, ends))))
+
+
+def _courses(process: Process, uses: Floats, damages: Floats, at: Floats) -> Floats:
+    """Return quantiles of the severities at some uses, shape (s, k, 3).
+
+    Parameters
+    ----------
+    uses : ndarray, shape (t, n)
+        Use of each unit after each step.
+    damages : ndarray, shape (t, n, k)
+        Damages there.
+    at : ndarray, shape (s,)
+        Uses.
+    """
+    units, out = np.arange(uses.shape[1]), []
+    for use in at:
+        low = np.clip((uses <= use).sum(axis=0) - 1, 0, max(len(uses) - 2, 0))
+        high = np.minimum(low + 1, len(uses) - 1)
+        gap = uses[high, units] - uses[low, units]
+        share = np.clip((use - uses[low, units]) / np.maximum(gap, 1e-300), 0.0, 1.0)[:, None]
+        damage = (1.0 - share) * damages[low, units] + share * damages[high, units]
+        out.append(_quantiles(process, damage))
+    return np.array(out)
 
 
 def _model_errors(
@@ -185,20 +242,6 @@ def _model_errors(
             r, k = governing(process.response, item.name)
             off[r] = np.sqrt(LASTING) * units.off[:, k, r] + np.sqrt(1.0 - LASTING) * off[r]
     return np.asarray(deviation * np.array(measured, dtype=np.float64)[:, None] * off)
-
-
-def _out_of_sight(more: float, ends: Floats) -> bool:
-    """Whether most have failed long ago, so that the rest has no end in sight."""
-    median = float(np.median(ends))
-    long_ago = np.isfinite(median) and more > _FAR * max(median, 1e-12)
-    return bool(long_ago) or more > _FARTHEST
-
-
-def _step(process: Process, rate: Floats) -> float:
-    """Repetitions in which the fastest units go a fiftieth of the way to the greatest severity."""
-    fast = np.quantile(rate, 0.9, axis=0)
-    with np.errstate(divide="ignore"):
-        return float(min(np.min(_STEP * process.range / fast), 0.1 * _FARTHEST))
 
 
 def crossing(before: Floats, after: Floats) -> tuple[Floats, npt.NDArray[np.intp]]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import erfc, pi, sqrt
 
 import numpy as np
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
-from elevon.prognose.bank import FaultBank
+from elevon.prognose.fault_filter import COMMON, RATE, SLOPE, WANDER, FaultFilter
 from elevon.prognose.future import LASTING, MODEL_ERROR
+from elevon.prognose.manner import WITHOUT_LAW, GrowthPrior, prior_of
 from elevon.prognose.observation import Inspection, Measured, Seen, governing
-from elevon.prognose.process import ONSET, Process, UnitPopulation
+from elevon.prognose.process import NUMBERS, ONSET, Process, UnitPopulation
 
 COUNT = 2000
 SURPRISE = 3.0
@@ -33,19 +35,22 @@ def _chance(scores: Floats) -> float:
 class GrowthFilter:
     """Severities and growth of a unit, fault by fault.
 
-    Faults are diagnosed one by one and hardly drive each other's growth: each has a `FaultBank` of
-    its own, whose clock runs at the pace that the other faults' medians give it.
+    Faults are diagnosed one by one and hardly drive each other's growth: each has a `FaultFilter`
+    of its own, whose clock runs at the pace that the other faults' means give it.
 
     Parameters
     ----------
     process : Process
         How units grow.
     seed : int
-        Of chance, for what is drawn.
+        Of chance.
+    priors : mapping of str to (GrowthPrior, GrowthPrior), optional
+        ``KIND@PLACE`` to what a fleet says of units beside the law and without it; default: what
+        the laws say, and what is ASSUMED.
 
     Attributes
     ----------
-    banks : list of FaultBank
+    faults : list of FaultFilter
         One a law.
     usage : float
         Use so far.
@@ -54,11 +59,23 @@ class GrowthFilter:
         what was expected.
     """
 
-    def __init__(self, process: Process, *, seed: int = 0) -> None:
+    def __init__(
+        self,
+        process: Process,
+        *,
+        seed: int = 0,
+        priors: Mapping[str, tuple[GrowthPrior, GrowthPrior]] | None = None,
+    ) -> None:
         self.process, self.usage = process, 0.0
-        self.banks = [
-            FaultBank(shapes, law.start_spread, law.dormant)
-            for shapes, law in zip(process.shapes, process.laws, strict=True)
+        given = priors or {}
+        self.faults = [
+            FaultFilter(
+                shapes,
+                law,
+                given.get(law.key, (prior_of(law), WITHOUT_LAW)),
+                np.random.default_rng([15, seed, k]),
+            )
+            for k, (shapes, law) in enumerate(zip(process.shapes, process.laws, strict=True))
         ]
         self.surprises: list[tuple[float, str, float]] = []
         self._scores: list[list[float]] = [[] for _ in process.laws]
@@ -71,12 +88,12 @@ class GrowthFilter:
             seen = item.seen.get(law.key)
             if seen is not None:
                 self._compare(k, seen)
-                self.banks[k].update(seen)
+                self.faults[k].update(seen)
         for name, value in item.measured.items():
             self._measured(name, value)
         for k, law in enumerate(self.process.laws):
             if law.key in item.reset:
-                self.banks[k].renew()
+                self.faults[k].renew()
                 self._scores[k] = []
 
     def _grow(self, usage: float) -> None:
@@ -84,20 +101,20 @@ class GrowthFilter:
             raise InputError(f"use goes back from {self.usage:g} to {usage:g}")
         if usage > self.usage:
             folds = ONSET * float(np.log(usage / self.usage)) if self.usage > 0.0 else 0.0
-            paces = self.process.paces(self.medians()) if len(self.banks) > 1 else np.ones(1)
-            for bank, pace in zip(self.banks, paces.tolist(), strict=True):
-                bank.grow(usage - self.usage, pace, folds)
+            paces = self.process.paces(self.medians()) if len(self.faults) > 1 else np.ones(1)
+            for fault, pace in zip(self.faults, paces.tolist(), strict=True):
+                fault.grow(usage - self.usage, pace, folds)
             self.usage = usage
 
     def medians(self) -> Floats:
         """Return the severities' means, shape (k,)."""
-        return np.array([bank.expected()[0] for bank in self.banks])
+        return np.array([fault.expected()[0] for fault in self.faults])
 
     def _compare(self, k: int, seen: Seen) -> None:
-        """Note a diagnosis that what was known before it hardly allows."""
-        if seen.severity is None:
+        """Note a diagnosis that what was known before it hardly allows: not the first sighting."""
+        if seen.severity is None or seen.probability < 0.5 or not self.faults[k].seen:
             return
-        mean, variance = self.banks[k].expected()
+        mean, variance = self.faults[k].expected()
         deviation = seen.low if mean < seen.severity else seen.high
         score = (seen.severity - mean) / np.sqrt(variance + deviation**2 + seen.common**2)
         self._scores[k].append(float(score))
@@ -112,10 +129,12 @@ class GrowthFilter:
         than `_GIVEN_UP`.
         """
         out = []
-        for k, (law, bank) in enumerate(zip(self.process.laws, self.banks, strict=True)):
+        for k, (law, fault) in enumerate(zip(self.process.laws, self.faults, strict=True)):
+            if law.trust <= 0.0:
+                continue
             scores = np.array(self._scores[k][-_CHECKED:])
-            family = bank.families()[law.name]
-            if len(scores) and (_chance(scores) < _UNLIKELY or family < _GIVEN_UP):
+            by_law = fault.by_law()
+            if len(scores) and (_chance(scores) < _UNLIKELY or by_law < _GIVEN_UP):
                 worst = float(scores[np.argmax(np.abs(scores))])
                 out.append((self.usage, law.key, worst))
         return out
@@ -141,7 +160,7 @@ class GrowthFilter:
             return np.asarray(response.reserve(severity)[r])
 
         lasting = float(np.sqrt(LASTING) * size)
-        self.banks[k].measure(
+        self.faults[k].measure(
             model, value=reserve, deviation=deviation, lasting=lasting, which=r,
             count=len(response.requirements),
         )  # fmt: skip
@@ -149,22 +168,26 @@ class GrowthFilter:
     def drawn(self, count: int, rng: np.random.Generator) -> UnitPopulation:
         """Draw units that may be this one."""
         laws, size = self.process.laws, len(self.process.response.requirements)
-        damage, growth = np.zeros((2, count, len(laws)))
+        numbers = {name: np.zeros((count, len(laws))) for name in NUMBERS}
         row = np.zeros((count, len(laws)), dtype=np.intp)
         active = np.ones((count, len(laws)), dtype=np.bool_)
         seeds = rng.integers(0, 2**63, len(laws) + 1)
-        measured = any(bank.mean.shape[-1] > 3 for bank in self.banks)
+        measured = any(fault.measured for fault in self.faults)
         free = np.random.default_rng(seeds[-1])
         off = free.standard_normal((count, len(laws), size if measured else 0))
-        for k, bank in enumerate(self.banks):
-            state, row[:, k], active[:, k] = bank.draw(count, np.random.default_rng(seeds[k]))
-            shapes = bank.shapes
-            damage[:, k] = np.interp(state[:, 0], shapes.level, shapes.damage)
-            growth[:, k] = state[:, 1]
-            if state.shape[1] > 3:
-                off[:, k] = state[:, 3:]
-        damage = np.where(active, damage, 0.0)
-        return UnitPopulation(damage, growth, row, active, off, self.usage)
+        for k, fault in enumerate(self.faults):
+            level, state, manner, active[:, k] = fault.draw(count, np.random.default_rng(seeds[k]))
+            shapes = fault.shapes
+            damage = np.interp(level, shapes.level, shapes.damage)
+            numbers["damage"][:, k] = np.where(active[:, k], damage, 0.0)
+            for name, index in (("growth", RATE), ("slope", SLOPE), ("wander", WANDER)):
+                numbers[name][:, k] = state[:, index]
+            for name in ("drift", "memory", "changes", "path"):
+                numbers[name][:, k] = getattr(manner, name)
+            row[:, k] = manner.row
+            if fault.measured:
+                off[:, k] = state[:, COMMON + 1 :]
+        return UnitPopulation(**numbers, row=row, active=active, off=off, usage=self.usage)
 
     @property
     def units(self) -> UnitPopulation:

@@ -102,6 +102,14 @@ class Law:
         Greatest severity that predictions look at [unit].
     only : bool
         Whether the fault grows by this law alone: no other way of growth is tried beside it.
+    trust : float
+        Probability that growth follows the law, before a history says more; else its rate is free.
+        0: there is no law, and its rate says only how long lives are.
+    life : float
+        Use of a life at a free rate, as a fleet's file has it; 0: as the law has it.
+    form : tuple of (float, float)
+        Share of the severity at the end of life, and share of the life after which a unit of the
+        fleet has it, at a free rate; empty: in proportion.
     """
 
     name: str
@@ -121,6 +129,9 @@ class Law:
     start_spread: float = 0.0
     dormant: float = 0.0
     only: bool = False
+    trust: float = 0.85
+    life: float = 0.0
+    form: tuple[tuple[float, float], ...] = ()
     whole: bool = False
     severity: Callable[[Floats], Floats] = field(default=_same)
     damage: Callable[[Floats], Floats] = field(default=_same)
@@ -135,6 +146,8 @@ class Law:
             _not_negative(f"law {self.name}: spread of {name}", item.spread)
         if not 0.0 <= self.dormant <= 1.0:
             raise RangeError(f"law {self.name}: dormant = {self.dormant:g} is outside 0 to 1")
+        if not 0.0 <= self.trust <= 1.0:
+            raise RangeError(f"law {self.name}: trust = {self.trust:g} is outside 0 to 1")
         if not self.highest > 0.0:
             raise RangeError(f"law {self.name}: highest = {self.highest:g} must be above 0")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Container, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -106,6 +107,14 @@ class Usage(_Frozen):
         if not 0.0 <= self.load_spread <= 1.0:
             raise ValueError(f"load_spread = {self.load_spread} is outside 0 to 1")
         return self
+
+
+@dataclass(frozen=True)
+class CountedUse:
+    """What is counted where no mission says it: the unit of use, loads as they were."""
+
+    unit: str
+    usage: Usage = field(default_factory=Usage)
 
 
 class Mission(_Frozen):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -12,6 +12,7 @@ from elevon.arrays import Floats
 from elevon.errors import RangeError
 from elevon.number_text import count_text
 from elevon.plain import Plain
+from elevon.prognose.answer import NextAction
 from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.growth import GrowthFilter
 from elevon.prognose.mission import Usage
@@ -20,6 +21,8 @@ from elevon.results import Result
 
 if TYPE_CHECKING:
     from elevon.prognose.answer import Prognosis
+    from elevon.prognose.fleet import Costs
+    from elevon.prognose.manner import GrowthPrior
     from elevon.prognose.observation import Inspection
     from elevon.prognose.response import ResponseTables
 
@@ -42,6 +45,7 @@ def assumptions(
     tables: ResponseTables,
     usage: Usage,
     *,
+    priors: Mapping[str, tuple[GrowthPrior, GrowthPrior]] | None = None,
     level: float,
     seed: int = 0,
 ) -> tuple[Assumed, ...]:
@@ -55,6 +59,8 @@ def assumptions(
         Of actuator and mission.
     usage : Usage
         Of the future.
+    priors : mapping, optional
+        As `GrowthFilter` takes them.
     level : float
         Of the intervals.
     seed : int
@@ -73,7 +79,7 @@ def assumptions(
     for name, of, how, error, future in cases:
         if name.startswith("loads") and usage == future:
             continue
-        flt = GrowthFilter(Process(of, **how), seed=seed)
+        flt = GrowthFilter(Process(of, **how), seed=seed, priors=priors)
         for item in inspections:
             flt.update(item)
         rng = np.random.default_rng([25, seed])
@@ -115,6 +121,11 @@ class NextInspection(Result):
         Of the prediction, and of the choice.
     serial : str or None
         Of the unit.
+    cost_rates : mapping of str to float
+        Expected cost of one unit of use, over the horizon: ``inspect`` within `within`, ``replace``
+        now, or ``wait`` without either.
+    horizon : float
+        Use from now on that they are counted over.
     """
 
     unit: str
@@ -127,9 +138,22 @@ class NextInspection(Result):
     assumptions: tuple[Assumed, ...]
     findings: tuple[str, ...]
     serial: str | None = None
+    cost_rates: Mapping[str, float] = field(default_factory=dict)
+    horizon: float = 0.0
 
     KIND: ClassVar = "next-inspection"
+    COMPUTED: ClassVar = ("action",)
     TABLE: ClassVar = "assumptions"
+
+    @property
+    def action(self) -> NextAction:
+        """The cheapest of inspecting, replacing now and waiting that keeps the risk."""
+        kind = min(self.cost_rates, key=self.cost_rates.__getitem__, default="inspect")
+        if kind == "replace" and self.within is not None:
+            return NextAction("replace", 0.0, self.unit)
+        if self.within is None:
+            return NextAction("none", None, self.unit)
+        return NextAction("inspect", self.within, self.unit)
 
     @property
     def headline(self) -> str:
@@ -137,6 +161,12 @@ class NextInspection(Result):
         how = f" with the test {self.test}" if self.test else ""
         if self.within is None:
             return f"No end of life is in sight at a risk of {self.risk:.2g}; look at leisure{how}."
+        if self.action.kind == "replace":
+            inspect, now = (self.cost_rates[name] for name in ("inspect", "replace"))
+            return (
+                f"Replace now: it costs {now:.3g} for each of the next {count_text(self.horizon)} "
+                f"{self.unit}, to inspect {inspect:.3g}."
+            )
         if self.within <= 0.0:
             return f"Inspect now{how}: the risk that the unit has failed exceeds {self.risk:.2g}."
         within = count_text(self.within)
@@ -149,12 +179,13 @@ class NextInspection(Result):
 def next_inspection(
     result: Prognosis,
     risk: float,
+    costs: Costs | None = None,
     *,
     test: str | None,
     assumed: Sequence[Assumed] = (),
     findings: Sequence[str] = (),
 ) -> NextInspection:
-    """Return when the probability of having failed reaches a risk.
+    """Return when the probability of having failed reaches a risk, and what is cheapest.
 
     Parameters
     ----------
@@ -162,6 +193,8 @@ def next_inspection(
         Of the unit.
     risk : float
         Accepted; at least what the number of futures can show.
+    costs : Costs, optional
+        Of what is weighed; without them nothing is.
     test : str or None
         What to look with.
     assumed, findings
@@ -180,6 +213,7 @@ def next_inspection(
         )
     ranked = np.sort(result.future.remaining)
     end = float(ranked[int(risk * len(ranked))])
+    rates, horizon = _cost_rates(ranked, end, costs) if costs is not None else ({}, 0.0)
     return NextInspection(
         result.unit,
         result.usage,
@@ -191,7 +225,30 @@ def next_inspection(
         tuple(assumed),
         (*findings, *result.findings),
         result.serial,
+        rates,
+        horizon,
     )
+
+
+_SEEN = 0.95  # of the ends in sight, that the horizon holds
+
+
+def _cost_rates(lives: Floats, within: float, costs: Costs) -> tuple[dict[str, float], float]:
+    """Return the cost of one unit of use by each choice, and the horizon.
+
+    An inspection shows what is left: the unit is then replaced just before its end, where that
+    lies within the horizon. What is replaced now throws its life away.
+    """
+    known = lives[np.isfinite(lives)]
+    far = max(float(np.quantile(known, _SEEN)), 1.0) if len(known) else 1.0
+    ends = float(np.mean(lives <= far))
+    before = float(np.mean(lives <= min(within, far)))
+    total = {
+        "inspect": costs.visit + costs.late * before + (ends - before) * costs.visit,
+        "replace": costs.visit + costs.early * float(np.mean(np.minimum(lives, far))),
+        "wait": costs.late * ends,
+    }
+    return {name: value / far for name, value in total.items()}, far
 
 
 _FEW = 5

@@ -124,12 +124,25 @@ class Seen:
     common : float
         Deviation of what this and all other diagnoses of the unit's fault err by alike, from one
         and the same baselines and model; beside `low` and `high`.
+    probability : float
+        Of a sighting: that the fault is there, as the diagnosis states it.
+    detectable : float
+        Severity that every other inspection sees; 0: not stated.
     """
 
     severity: float | None
     low: float
     high: float
     common: float = 0.0
+    probability: float = 1.0
+    detectable: float = 0.0
+
+    @property
+    def limit(self) -> float:
+        """The detection limit; of a fault that was not seen, at least what its deviation says."""
+        if self.detectable > 0.0 or self.severity is not None:
+            return self.detectable
+        return DETECTED * self.high
 
 
 @dataclass(frozen=True)
@@ -196,7 +209,7 @@ def inspection(
         if cause is not None:
             read = _read(cause, law, limit, _edge(law, candidates), f"{name}: {law.key}")
         elif limit is not None:
-            read = Seen(None, limit / DETECTED, limit / DETECTED)
+            read = Seen(None, limit / DETECTED, limit / DETECTED, detectable=limit)
         else:
             continue
         seen[law.key] = replace(read, common=_common(law.kind, read.severity or 0.0))
@@ -222,13 +235,11 @@ def _common(kind: str, severity: float) -> float:
 
 
 def _cause(data: Mapping[str, Any], law: Law, place: str) -> _Cause | None:
-    """Return the cause that is the law's fault, also by a place it is ambiguous with.
-
-    A cause that is less likely than not is none: its severity is that of a guess.
-    """
+    """Return the likeliest cause that is the law's fault, also by a place it is ambiguous with."""
     given = data.get("faults", [])
     if not isinstance(given, list):
         raise InputError(f"{place}: faults = {given!r} is not a list of causes")
+    found = []
     for k, item in enumerate(given):
         cause = _Cause.from_dict(item, f"{place}: faults[{k}]")
         if not 0.0 <= cause.probability <= 1.0:
@@ -236,9 +247,9 @@ def _cause(data: Mapping[str, Any], law: Law, place: str) -> _Cause | None:
                 f"{place}: faults[{k}]: probability = {cause.probability:g} is outside 0 to 1"
             )
         names = (FaultPlace(cause.kind, cause.place), *cause.ambiguous_with)
-        if cause.probability >= 0.5 and (law.kind, law.place) in names:
-            return cause
-    return None
+        if (law.kind, law.place) in names:
+            found.append(cause)
+    return max(found, key=lambda cause: cause.probability, default=None)
 
 
 def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
@@ -297,6 +308,8 @@ def _read(cause: _Cause, law: Law, limit: float | None, edge: float, place: str)
         severity,
         max((severity - low) / SIGMAS, floor),
         max((high - severity) / SIGMAS, floor),
+        probability=cause.probability,
+        detectable=limit or 0.0,
     )
 
 

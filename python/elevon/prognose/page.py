@@ -16,7 +16,7 @@ from elevon.units import display_unit, to_display
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from elevon.prognose.answer import Prognosis
+    from elevon.prognose.answer import Branch, Prognosis
     from elevon.prognose.law import Law
     from elevon.prognose.next_inspection import Assumed
 
@@ -95,29 +95,56 @@ def survival_figure(result: Prognosis) -> Figure:
 
 
 def sentence(result: Prognosis) -> str:
-    """Return the answer in one sentence, and where the history contradicts the law, that."""
+    """Return the answer in one sentence: what to do, then the remaining life of each branch."""
+    said = f"{result.action.text} {_remaining(result)}"
     if not result.off_law:
-        return _remaining(result)
+        return said
     worst = max(result.off_law, key=lambda item: abs(item.deviations))
-    return f"{_remaining(result)} The history contradicts the law: {worst.text}."
+    return f"{said} The history contradicts the law: {worst.text}."
 
 
 def _remaining(result: Prognosis) -> str:
-    low, high = result.interval
-    if not np.isfinite(result.median):
-        if not np.isfinite(low):
-            return f"No end of life is in sight ({result.level:.0%} of the futures and more)."
+    if len(result.branches) > 1:
+        return _branched(result.branches)
+    if np.isfinite(result.median):
+        name, share = next(iter(result.first.items()))
+        median, ends = _life(result)
         return (
-            f"No end of life is in sight in more than half of the futures; the shortest "
-            f"{0.5 * (1.0 - result.level):.0%} end within {count_text(low)} {result.unit}."
+            f"{median} {result.unit} remain ({result.level:.0%}: {ends}); "
+            f"{name} fails first in {share:.0%} of the futures."
         )
-    name, share = next(iter(result.first.items()))
-    upper = count_text(high) if np.isfinite(high) else "no end in sight"
-    median, lower = count_text(result.median), count_text(low)
+    low = result.interval[0]
+    if not np.isfinite(low):
+        return f"No end of life is in sight ({result.level:.0%} of the futures and more)."
     return (
-        f"{median} {result.unit} remain ({result.level:.0%}: {lower} to {upper}); "
-        f"{name} fails first in {share:.0%} of the futures."
+        f"No end of life is in sight in more than half of the futures; the shortest "
+        f"{0.5 * (1.0 - result.level):.0%} end within {count_text(low)} {result.unit}."
     )
+
+
+def _life(item: Prognosis | Branch) -> tuple[str, str]:
+    """Return a median and an interval in words."""
+    low, high = (
+        count_text(end) if np.isfinite(end) else "no end in sight" for end in item.interval
+    )
+    return count_text(item.median), f"{low} to {high}"
+
+
+def _branched(branches: Sequence[Branch]) -> str:
+    """Return the branches in words."""
+    out = []
+    for number, item in enumerate(branches):
+        start = f"If {item.what} (p = {item.probability:.2f}): " if number == 0 else "if not, "
+        if np.isfinite(item.median):
+            median, ends = _life(item)
+            out.append(f"{start}{median} {item.unit} ({ends})")
+        elif number:
+            out.append(f"{start}no end is known")
+        else:
+            low = item.interval[0]
+            near = f" before {count_text(low)} {item.unit}" if np.isfinite(low) else ""
+            out.append(f"{start}no end is known{near}")
+    return "; ".join(out) + "."
 
 
 def prognosis_page(

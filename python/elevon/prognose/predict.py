@@ -3,31 +3,35 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
 from math import erfc, inf, log, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from elevon.errors import InputError
 from elevon.number_text import count_text
-from elevon.prognose.answer import KnownFault, OffLaw, Prognosis, Reserve
-from elevon.prognose.future import MODEL_ERROR, look_ahead
+from elevon.prognose.answer import Branch, KnownFault, OffLaw, Prognosis, Reserve
+from elevon.prognose.future import MODEL_ERROR, Future, look_ahead
 from elevon.prognose.growth import COUNT, GrowthFilter
 from elevon.prognose.observation import Inspection
 from elevon.prognose.process import Process
 from elevon.prognose.response import ResponseTables, check_start
+from elevon.prognose.shapes import FREE
 from elevon.prognose.tabulate import respond
 from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.prognose.mission import Mission, Usage
+    from elevon.prognose.manner import GrowthPrior
+    from elevon.prognose.mission import CountedUse, Mission, Usage
     from elevon.prognose.process import UnitPopulation
 
 LEVEL = 0.9
 _OUTSIDE = 0.01  # share of futures beyond the tables' loads that is stated
+_LIKELY = 0.5  # probability from which a sighting counts as one
 _LEAST = 3  # inspections that saw a fault before its growth counts as known
 
 
@@ -71,18 +75,52 @@ def predict(
     InputError
         Use goes back; a new unit violates a requirement; the actuator cannot do the mission.
     """
+    tables = response or respond(actuator, mission, snapshots=snapshots)
+    return predict_by_tables(
+        inspections, mission, tables, particles=particles, level=level, seed=seed, serial=serial
+    )
+
+
+def predict_by_tables(
+    inspections: Sequence[Inspection],
+    counted: Mission | CountedUse,
+    tables: ResponseTables,
+    *,
+    priors: Mapping[str, tuple[GrowthPrior, GrowthPrior]] | None = None,
+    particles: int = COUNT,
+    level: float = LEVEL,
+    seed: int = 0,
+    serial: str = "",
+) -> Prognosis:
+    """Predict a unit's remaining useful life from tables of what severities do.
+
+    Parameters
+    ----------
+    inspections, particles, level, seed, serial
+        As `predict`.
+    counted : Mission or CountedUse
+        What is counted, and how the loads to come may differ.
+    tables : ResponseTables
+        Of the unit.
+    priors : mapping of str to (GrowthPrior, GrowthPrior), optional
+        As `GrowthFilter` takes them.
+
+    Raises
+    ------
+    InputError
+        As `predict`.
+    """
     if not 0.0 < level < 1.0:
         raise InputError(f"level {level:g} must be between 0 and 1")
-    tables = response or respond(actuator, mission, snapshots=snapshots)
     _check_new(tables)
     made = clock.perf_counter()
-    flt = GrowthFilter(Process(tables), seed=seed)
+    flt = GrowthFilter(Process(tables), seed=seed, priors=priors)
     check_order(inspections)
     for item in inspections:
         flt.update(item)
     updated = clock.perf_counter()
     result = prognosis(
-        flt, mission, inspections, level=level, seed=seed, serial=serial, particles=particles
+        flt, counted, inspections, level=level, seed=seed, serial=serial, particles=particles
     )
     done = clock.perf_counter()
     result.seconds.update(  # type: ignore[attr-defined]
@@ -93,7 +131,7 @@ def predict(
 
 def prognosis(
     flt: GrowthFilter,
-    mission: Mission,
+    mission: Mission | CountedUse,
     inspections: Sequence[Inspection],
     *,
     level: float = LEVEL,
@@ -129,8 +167,53 @@ def prognosis(
         reserve,
         (),
         serial or None,
+        branches=_branches(known, inspections, units, future, level=level, unit=mission.unit),
     )
     return _with_findings(result, flt, inspections, mission.usage)
+
+
+_CERTAIN = 0.02  # probability of either side below which a branch is not told apart
+
+
+def _branches(
+    known: Sequence[KnownFault],
+    inspections: Sequence[Inspection],
+    units: UnitPopulation,
+    future: Future,
+    *,
+    level: float,
+    unit: str,
+) -> tuple[Branch, ...]:
+    """Return the remaining lives with and without the seen fault that is least certain to be real.
+
+    One branch where all that was seen is certain.
+    """
+    unsure = [
+        (abs(item.growing - 0.5), k)
+        for k, item in enumerate(known)
+        if _CERTAIN < item.growing < 1.0 - _CERTAIN
+        and any(_saw(i, item.key) for i in _since_reset(inspections, item.key))
+    ]
+    everything = np.ones(len(units), dtype=np.bool_)
+    if not unsure:
+        return (_branch("all that was seen is real", everything, future, level, unit),)
+    real = units.active[:, min(unsure)[1]]
+    name = known[min(unsure)[1]].kind.replace("_", " ")
+    return (
+        _branch(f"the {name} is real", real, future, level, unit),
+        _branch(f"the {name} is not real", ~real, future, level, unit),
+    )
+
+
+def _branch(
+    what: str, chosen: npt.NDArray[np.bool_], future: Future, level: float, unit: str
+) -> Branch:
+    ranked, tail = np.sort(future.remaining[chosen]), 0.5 * (1.0 - level)
+    low, median, high = (
+        float(ranked[min(int(share * len(ranked)), len(ranked) - 1)])
+        for share in (tail, 0.5, 1.0 - tail)
+    )
+    return Branch(what, float(chosen.mean()), median, (low, high), level, unit)
 
 
 def check_order(inspections: Sequence[Inspection]) -> None:
@@ -187,17 +270,17 @@ def _known(
                 (float(low), float(high)),
                 float(median),
                 (float(slow), float(fast)),
-                sum(1 for i in since if _saw(i, law.key)),
+                sum(1 for i in since if _saw(i, law.key, _LIKELY)),
                 float(grows.mean()),
-                flt.banks[k].families(),
+                {law.name: flt.faults[k].by_law(), FREE: 1.0 - flt.faults[k].by_law()},
             )
         )
     return tuple(out)
 
 
-def _saw(item: Inspection, key: str) -> bool:
+def _saw(item: Inspection, key: str, least: float = 0.0) -> bool:
     seen = item.seen.get(key)
-    return seen is not None and seen.severity is not None
+    return seen is not None and seen.severity is not None and seen.probability >= least
 
 
 def _since_reset(inspections: Sequence[Inspection], key: str) -> Sequence[Inspection]:

@@ -11,16 +11,21 @@ import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
-from elevon.prognose.bank import BEND, BEND_SPREAD, GROWTHS
+from elevon.prognose.fault_filter import CHANGE, GROWTHS, JUMP, JUMPS
 from elevon.prognose.law import Law
+from elevon.prognose.manner import BESIDE_LAW, draw_manner, draw_rates, prior_of
 from elevon.prognose.response import ResponseTables
 from elevon.prognose.shapes import Shapes, members, shapes_of
 
 ONSET = 0.05
 """Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
+AHEAD = 0.5
+"""Sudden changes of the rate to come, over those that a history is searched for. ASSUMED: what may
+have happened is weighed by inspections, what is to come only widens the answer."""
 
 _LONGEST = 0.3  # of a life: what may happen to a rate in a longer step counts as in that
-_OF_LAWS = ("damage", "growth", "row", "active", "off")  # unit, law
+NUMBERS = ("damage", "growth", "slope", "wander", "drift", "memory", "changes", "path")
+_OF_LAWS = (*NUMBERS, "row", "active", "off")
 
 
 @dataclass(frozen=True)
@@ -32,9 +37,15 @@ class UnitPopulation:
     damage : ndarray, shape (n, k)
         Of each law.
     growth : ndarray, shape (n, k)
-        Logarithm of the unit's own factor on each fault's rate.
+        Logarithm of the unit's rate of each fault over the law's.
+    slope : ndarray, shape (n, k)
+        Power by which that follows the severity.
+    wander : ndarray, shape (n, k)
+        Part of `growth` that fades with use.
     row : ndarray of int, shape (n, k)
-        How each fault grows: row of the law's `Shapes`; 0 is the law as it stands.
+        Row of the law's `Shapes`; 0 is the law as it stands.
+    drift, memory, changes, path : ndarray, shape (n, k)
+        As in `GrowthPrior`, of each unit.
     active : ndarray of bool, shape (n, k)
         Whether the fault grows.
     off : ndarray, shape (n, k, m)
@@ -46,18 +57,31 @@ class UnitPopulation:
 
     damage: Floats
     growth: Floats
+    slope: Floats
+    wander: Floats
     row: npt.NDArray[np.intp]
+    drift: Floats
+    memory: Floats
+    changes: Floats
+    path: Floats
     active: npt.NDArray[np.bool_]
     off: Floats
     usage: float = 0.0
 
     @classmethod
     def of(cls, damage: Floats, growth: Floats, *, usage: float = 0.0) -> UnitPopulation:
-        """Return growing units, shape (n, k), by the laws as they stand."""
+        """Return growing units, shape (n, k), by the laws as they stand, whose rates stay."""
+        none = np.zeros(growth.shape)
         return cls(
             damage=damage,
             growth=growth,
+            slope=none,
             row=np.zeros(growth.shape, dtype=np.intp),
+            wander=none,
+            drift=none,
+            memory=none + 1.0,
+            changes=none,
+            path=none,
             active=np.ones(growth.shape, dtype=np.bool_),
             off=np.zeros((*growth.shape, 0)),
             usage=usage,
@@ -80,7 +104,7 @@ class Process:
     response : ResponseTables
         What severities do.
     wander : bool
-        Whether rates drift and bend as units are used.
+        Whether rates drift and change as units are used.
 
     Attributes
     ----------
@@ -88,6 +112,8 @@ class Process:
         Of each law.
     range : ndarray, shape (k,)
         Damage from new to the end of life that each fault alone brings.
+    lives : list of ndarray
+        Use from new to that end, of each row of the fault's `Shapes`.
     """
 
     def __init__(self, response: ResponseTables, *, wander: bool = True) -> None:
@@ -103,7 +129,7 @@ class Process:
         # Beyond the greatest severity of the tables nothing is known; no state runs away there.
         self._most = np.array([s.damage[-1] for s in self.shapes])
         self._modifiers = [self._modifier(k) for k in range(len(self.laws))]
-        self._lives = [s.life() for s in self.shapes]
+        self.lives = [s.life() for s in self.shapes]
 
     def _limit(self, k: int) -> float:
         """Return the severity at which a fault alone ends the life; the greatest, where none."""
@@ -118,13 +144,12 @@ class Process:
         severity = np.tile(self.severity(self._new[None, :])[0], (len(damage), 1))
         severity[:, k] = law.severity(damage)
         drivers = self.response.exposed(severity, np.ones(len(damage)))
-        form, deviations, _ = members(law)[member]
+        deviations, _ = members(law)[member]
         factors = {
             name: np.exp(np.full(len(damage), deviation))
             for name, deviation in zip(law.spreading, deviations, strict=True)
         }
-        hastened = (1.0 + severity[:, k] / (0.25 * law.highest)) ** form
-        return np.asarray(law.growth(damage, drivers, factors) * hastened)
+        return np.asarray(law.growth(damage, drivers, factors))
 
     def _modifier(self, k: int) -> Floats:
         """Return the rows' growth over the law's between the points, shape (n, p - 1)."""
@@ -139,17 +164,40 @@ class Process:
             raise InputError(f"{count} samples: at least 10 are needed")
         size = len(self.laws)
         spread = np.array([law.start_spread for law in self.laws])
-        growth = np.array([law.spread for law in self.laws])
         active = rng.random((count, size)) >= np.array([law.dormant for law in self.laws])
         damage = np.maximum(self._new + spread * rng.standard_normal((count, size)), 0.0)
-        rows = [
-            rng.choice(len(m), size=count, p=[share for *_, share in m])
-            for m in map(members, self.laws)
-        ]
+        none = np.zeros(count, dtype=np.bool_)
+        columns: list[list[Floats]] = []
+        for law in self.laws:
+            shares = np.array([share for _, share in members(law)])
+            priors = (prior_of(law), BESIDE_LAW)
+            manner = draw_manner(count, np.zeros(len(shares), dtype=np.bool_), shares, priors, rng)
+            drawn = draw_rates(none, law, priors, rng)
+            row = rng.permutation(manner.row)
+            columns.append(
+                [
+                    drawn.rate,
+                    drawn.slope,
+                    row,
+                    manner.drift,
+                    manner.memory,
+                    manner.changes,
+                    manner.path,
+                ]
+            )
+        growth, slope, row, drift, memory, changes, path = (
+            np.column_stack(c) for c in zip(*columns, strict=True)
+        )
         return UnitPopulation(
             damage=np.where(active, damage, 0.0),
-            growth=growth * rng.standard_normal((count, size)),
-            row=np.column_stack(rows).astype(np.intp),
+            growth=growth,
+            slope=slope,
+            row=row.astype(np.intp),
+            wander=np.zeros((count, size)),
+            drift=drift,
+            memory=memory,
+            changes=changes,
+            path=path,
             active=active,
             off=np.zeros((count, size, 0)),
         )
@@ -214,78 +262,94 @@ class Process:
     def advance(
         self,
         units: UnitPopulation,
-        steps: float,
+        steps: float | Floats,
         rng: np.random.Generator | None,
         load: Floats | None = None,
         rate: Floats | None = None,
     ) -> UnitPopulation:
-        """Let all units be used `steps` repetitions more, in one step of the midpoint rule.
+        """Let all units be used more, in one step of the midpoint rule.
 
-        Without a random generator growth is the mean one; `rate` is that of the units as they
-        stand, where it is known already.
+        Parameters
+        ----------
+        units : UnitPopulation
+            Now; their `usage` rises where `steps` is a number.
+        steps : float or ndarray, shape (n,)
+            Repetitions, of all units or of each.
+        rng : Generator, optional
+            Of chance; without it growth is the mean one.
+        load : ndarray, shape (n,), optional
+            Factor on the mission's loads.
+        rate : ndarray, shape (n, k), optional
+            That of the units as they stand, where it is known already.
         """
         ones = np.ones(len(units)) if load is None else load
-        first = steps * (self.rate(units, units.damage, ones) if rate is None else rate)
-        mean = steps * self.rate(units, units.damage + 0.5 * first, ones)
-        damage, growth, active = units.damage, units.growth, units.active
-        if rng is None:
-            damage = damage + mean
-        else:
-            damage = damage + self._scattered(units, mean, rng)
-            if self.wander:
-                growth = self._wandered(units, steps, mean, rng)
-            if units.usage > 0.0 and not active.all():
-                folds = float(np.log1p(steps / units.usage))
-                active = active | (rng.random(active.shape) < -np.expm1(-ONSET * folds))
-                begun = active & ~units.active & (damage <= 0.0)
-                damage = np.where(begun, self._new, damage)
+        each = np.reshape(np.asarray(steps, dtype=np.float64), (-1, 1))
+        first = each * (self.rate(units, units.damage, ones) if rate is None else rate)
+        mean = each * self.rate(units, units.damage + 0.5 * first, ones)
+        folds = self._folds(units, units.damage + 0.5 * mean)
+        mean = mean * np.exp(np.clip(units.slope * folds, -1.0, 1.0))
+        damage = units.damage + (mean if rng is None else self._scattered(units, mean, rng))
+        damage = np.minimum(damage, self._most)
+        growth, wander = units.growth + units.slope * self._folds(units, damage), units.wander
+        if rng is not None and self.wander:
+            growth, wander = self._wandered(units, growth, each, mean, rng)
         return replace(
             units,
-            damage=np.minimum(damage, self._most),
-            growth=growth,
-            active=active,
-            usage=units.usage + steps,
+            damage=damage,
+            growth=np.clip(growth, -GROWTHS, GROWTHS),
+            wander=wander,
+            usage=units.usage + float(each[0, 0]) if np.ndim(steps) == 0 else units.usage,
         )
 
-    def _scattered(self, units: UnitPopulation, mean: Floats, rng: np.random.Generator) -> Floats:
-        """Draw increments of gamma processes: mean D, variance D times the row's grain."""
-        out = mean.copy()
+    def _folds(self, units: UnitPopulation, damage: Floats) -> Floats:
+        """Return by how much the logarithm of the severity grows up to a damage, shape (n, k)."""
+        out = np.zeros(damage.shape)
         for k, shapes in enumerate(self.shapes):
-            grain = shapes.grain[units.row[:, k]]
+            if units.slope[:, k].any():
+                before, after = (
+                    np.interp(d[:, k], shapes.damage, shapes.level) for d in (units.damage, damage)
+                )
+                row = units.row[:, k]
+                out[:, k] = shapes.logarithm(after, row) - shapes.logarithm(before, row)
+        return out
+
+    def _scattered(self, units: UnitPopulation, mean: Floats, rng: np.random.Generator) -> Floats:
+        """Draw increments of gamma processes: mean D, variance D times the grain; and jumps."""
+        out = mean.copy()
+        for k, (shapes, law) in enumerate(zip(self.shapes, self.laws, strict=True)):
+            own = units.path[:, k] ** 2 * self.range[k]
+            free = shapes.free[units.row[:, k]]
+            grain = np.where(free, own, law.grain)
             if grain.any():
                 scale = np.maximum(grain, 1e-300)
                 drawn = scale * rng.standard_gamma(np.minimum(mean[:, k] / scale, 1e12))
                 out[:, k] = np.where(grain > 0.0, drawn, mean[:, k])
+            if self.wander:
+                moved = np.minimum(mean[:, k] / self.range[k], _LONGEST)
+                jumps = free & (rng.random(len(units)) < JUMPS * moved)
+                size = JUMP * self.range[k] * np.abs(rng.standard_normal(len(units)))
+                out[:, k] += np.where(jumps, size, 0.0)
         return out
 
     def _wandered(
-        self, units: UnitPopulation, steps: float, mean: Floats, rng: np.random.Generator
-    ) -> Floats:
-        """Return growth factors after a step: they drift, and now and then they bend."""
-        growth = units.growth.copy()
-        for k, (shapes, life) in enumerate(zip(self.shapes, self._lives, strict=True)):
-            row = units.row[:, k]
-            lives = np.minimum(np.exp(growth[:, k]) * steps / life[row], _LONGEST)
-            normal = rng.standard_normal((3, len(units)))
-            bend = rng.random(len(units)) < 2.0 * shapes.ahead[row] * lives
-            side = np.where(normal[1] > 0.0, BEND, -BEND) + BEND_SPREAD * normal[2]
-            moved = np.maximum(lives, np.minimum(mean[:, k] / self.range[k], _LONGEST))
-            growth[:, k] += shapes.drift[row] * np.sqrt(moved) * normal[0] + bend * side
-        return np.clip(growth, -GROWTHS, GROWTHS)
-
-    def to(
         self,
         units: UnitPopulation,
-        usage: float,
-        rng: np.random.Generator | None,
-        *,
-        steps: int = 12,
-    ) -> UnitPopulation:
-        """Use all units up to `usage`, in `steps` steps."""
-        if usage < units.usage:
-            raise InputError(f"use goes back from {units.usage:g} to {usage:g}")
-        if usage == units.usage:
-            return units
-        for stop in np.linspace(units.usage, usage, steps + 1)[1:]:
-            units = self.advance(units, float(stop) - units.usage, rng)
-        return replace(units, usage=usage)
+        growth: Floats,
+        steps: Floats,
+        mean: Floats,
+        rng: np.random.Generator,
+    ) -> tuple[Floats, Floats]:
+        """Return rates, and their parts that fade, after a step; now and then a rate changes."""
+        growth, wander = growth.copy(), units.wander.copy()
+        for k in range(len(self.laws)):
+            time = steps[:, 0] / self.lives[k][units.row[:, k]]
+            used = time * np.exp(units.growth[:, k])
+            moved = np.minimum(np.maximum(used, mean[:, k] / self.range[k]), _LONGEST)
+            remains = np.exp(-np.maximum(moved, time) / units.memory[:, k])
+            normal = rng.standard_normal((2, len(units)))
+            fades = units.drift[:, k] * np.sqrt(1.0 - remains**2) * normal[0]
+            wander[:, k] = remains * units.wander[:, k] + fades
+            change = rng.random(len(units)) < AHEAD * units.changes[:, k] * moved
+            growth[:, k] += wander[:, k] - units.wander[:, k]
+            growth[:, k] += np.where(change, CHANGE * normal[1], 0.0)
+        return growth, wander
