@@ -31,7 +31,7 @@ _PLAN = "fleet of units"
 def study_lives(
     *,
     lives: int = 300,
-    own: int = 60,
+    by_law: int = 60,
     units: int = 200,
     public: Sequence[str | Path] | None = None,
     seed: int = 0,
@@ -45,7 +45,7 @@ def study_lives(
     ----------
     lives : int
         Drawn at random.
-    own : int
+    by_law : int
         By each law that the filter is told, at 2, at 3 and at any number of inspections.
     units : int
         Of the fleet that is kept for five years.
@@ -70,7 +70,7 @@ def study_lives(
     if lives < 3:
         raise InputError(f"{lives} lives: at least 3 are needed")
     begin = clock.perf_counter()
-    works = _works(lives, own, units, tuple(map(Path, public or ())), seed)
+    works = _works(lives, by_law, units, tuple(map(Path, public or ())), seed)
     with finished(folder, f"lives seed {seed}") as done:
         known: dict[str, Any] = {
             name: done.items[name].data["rows"] for name in works if done and name in done.items
@@ -88,21 +88,21 @@ def study_lives(
 
 
 def _works(
-    lives: int, own: int, units: int, public: tuple[Path, ...], seed: int
+    lives: int, by_law: int, units: int, public: tuple[Path, ...], seed: int
 ) -> dict[str, partial[Any]]:
     out: dict[str, partial[Any]] = {}
     for k in range(lives):
         out[f"drawn {k}"] = partial(_drawn, k, seed)
     for law in FAULTS:
-        for k in range(own // len(FAULTS)):
+        for k in range(by_law // len(FAULTS)):
             for looks in (0, 2, 3):
-                out[f"{law} {k} {looks}"] = partial(_own, law, k, looks, seed)
+                out[f"{law} {k} {looks}"] = partial(_by_law, law, k, looks, seed)
     for k in range(_CRACKS):
         out[f"crack {k}"] = partial(_crack, k, seed)
     for place in public:
         for k, unit in enumerate(public_histories(place)):
             out[f"{place.name} {k}"] = partial(real_rows, place.name, k, unit, seed)
-    for k in range(_POPULATIONS if own else 0):
+    for k in range(_POPULATIONS if by_law else 0):
         out[f"population {k}"] = partial(learned_rows, k, seed)
     if units:
         out[f"{_PLAN} {units}"] = partial(plan_rows, seed, units=units)
@@ -117,7 +117,7 @@ def _crack(number: int, seed: int) -> list[dict[str, Any]]:
     return real_rows("Virkler", number, crack_history(number, seed), seed)
 
 
-def _own(law: str, number: int, looks: int, seed: int) -> list[dict[str, Any]]:
+def _by_law(law: str, number: int, looks: int, seed: int) -> list[dict[str, Any]]:
     """Predict a life by its own law, as told it and as one that knows law and spread."""
     life = own_life(law, number, seed)
     seen = own_inspections(life, number, seed, looks=looks or None)

@@ -85,13 +85,13 @@ class LivesResult:
 
     def _of_drawn(self) -> list[Check]:
         ours = self.rows(DRAWN, OURS)
-        said = figures(ours)
+        values = figures(ours)
         out = [
-            Check("90 % intervals cover", said["coverage90"], _COVERAGE[0], at_least=True),
-            Check("90 % intervals cover, at most", said["coverage90"], _COVERAGE[1]),
-            Check("50 % intervals cover", said["coverage50"], _HALF[0], at_least=True),
-            Check("50 % intervals cover, at most", said["coverage50"], _HALF[1]),
-            Check("lives below the 1 % quantile", said["below1"], _TAIL),
+            Check("90 % intervals cover", values["coverage90"], _COVERAGE[0], at_least=True),
+            Check("90 % intervals cover, at most", values["coverage90"], _COVERAGE[1]),
+            Check("50 % intervals cover", values["coverage50"], _HALF[0], at_least=True),
+            Check("50 % intervals cover, at most", values["coverage50"], _HALF[1]),
+            Check("lives below the 1 % quantile", values["below1"], _TAIL),
             Check("probability of a histogram as uneven, if it were flat", flatness(ours), _FLAT,
                   at_least=True),
             Check("score over the best other method's", _ratio(self.judged, DRAWN), 1.0),
@@ -114,11 +114,11 @@ class LivesResult:
         for looks in (2, 3):
             mine = self.rows(f"own law, {looks} inspections", OURS)
             if mine:
-                said = figures(mine)
+                values = figures(mine)
                 out += [
-                    Check(f"accuracy at {looks} inspections", said["accuracy"], _ACCURACY,
+                    Check(f"accuracy at {looks} inspections", values["accuracy"], _ACCURACY,
                           at_least=True),
-                    Check(f"coverage at {looks} inspections", said["coverage90"], _COVERAGE[0],
+                    Check(f"coverage at {looks} inspections", values["coverage90"], _COVERAGE[0],
                           at_least=True),
                 ]  # fmt: skip
         return out

@@ -169,7 +169,7 @@ class _Inspector:
 
     relative: float
     absolute: float
-    told: float  # what is stated of the scatter, over it
+    stated: float  # what is stated of the scatter, over it
     detectable: float
     bias: float  # common to all, relative
     missed: float  # share of well visible faults that are not seen
@@ -182,7 +182,7 @@ class _Inspector:
         return cls(
             relative=float(np.exp(rng.uniform(np.log(0.005), np.log(0.08)))),
             absolute=absolute,
-            told=float(np.exp(rng.normal(0.0, 0.35))),
+            stated=float(np.exp(rng.normal(0.0, 0.35))),
             detectable=float(rng.uniform(2.0, 4.0)) * absolute,
             bias=stated_bias * float(rng.standard_normal()),
             missed=float(rng.choice(missed, p=[0.8, 0.2])),
@@ -198,23 +198,23 @@ class _Inspector:
             if rng.random() >= _FALSE:
                 return Look(usage, None, self.detectable / 3.0, 0.0)
             seen = self.detectable * float(rng.uniform(1.0, 3.0))  # and not sure of itself
-            return Look(usage, seen, self._said(seen), float(rng.uniform(0.25, 0.75)))
+            return Look(usage, seen, self._stated(seen), float(rng.uniform(0.25, 0.75)))
         if rng.random() < self.missed:
             return Look(usage, None, self.detectable / 3.0, 0.0)
-        sure = rng.random() < _SURE
-        probability = 1.0 - rng.beta(1.0, 12.0) if sure else rng.uniform(0.4, 0.9)
-        return Look(usage, value, self._said(value), float(probability))
+        certain = rng.random() < _CERTAIN
+        probability = 1.0 - rng.beta(1.0, 12.0) if certain else rng.uniform(0.4, 0.9)
+        return Look(usage, value, self._stated(value), float(probability))
 
     def _deviation(self, severity: float) -> float:
         return float(np.hypot(self.relative * severity, self.absolute))
 
-    def _said(self, severity: float) -> float:
-        return self.told * self._deviation(severity)
+    def _stated(self, severity: float) -> float:
+        return self.stated * self._deviation(severity)
 
 
 _STRAY = 0.015  # share of the diagnoses that err far
 _FALSE = 0.03  # share of the inspections of a fault that cannot be seen that report one
-_SURE = 0.85  # share of the sightings with a high probability
+_CERTAIN = 0.85  # share of the sightings with a high probability
 
 
 def _inspected(number: int, rng: Rng, course: tuple[Floats, Floats, int], count: int) -> DrawnLife:

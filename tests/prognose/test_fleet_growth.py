@@ -35,11 +35,11 @@ def test_growth_of_a_fleet_is_learned_and_narrows_the_answer(tmp_path):
     pytest.importorskip("lifelines")
     units, lives = fleet(tmp_path)
     growth = elevon.learn_growth(units, limit="1", censored=lives)
-    said = growth.growth[VALUE]
-    assert said.life == pytest.approx(1000.0 / 1.1**2, rel=0.25)
-    assert said.spread == pytest.approx(SPREAD, abs=0.15)
-    assert said.covariates["load"] == pytest.approx(2.0 / 1.05, rel=0.4)
-    course = dict(said.form)
+    learned = growth.growth[VALUE]
+    assert learned.life == pytest.approx(1000.0 / 1.1**2, rel=0.25)
+    assert learned.spread == pytest.approx(SPREAD, abs=0.15)
+    assert learned.covariates["load"] == pytest.approx(2.0 / 1.05, rel=0.4)
+    course = dict(learned.form)
     assert course[0.5] == pytest.approx(0.5 ** (1.0 / POWER), abs=0.05)
     kept = load(growth.save(tmp_path / "growth.json"))
     assert kept == growth

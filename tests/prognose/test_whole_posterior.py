@@ -15,9 +15,9 @@ def course(*probabilities):
 
 def test_sightings_that_are_not_sure_are_no_absence():
     """Right severities, probability 0.9 and 0.48 in turn: as with 0.9 throughout."""
-    sure, turns = answer(*course(0.9)), answer(*course(0.9, 0.48))
-    assert turns.median == pytest.approx(sure.median, rel=0.1)
-    for result in (sure, turns):
+    steady, turns = answer(*course(0.9)), answer(*course(0.9, 0.48))
+    assert turns.median == pytest.approx(steady.median, rel=0.1)
+    for result in (steady, turns):
         low, high = result.interval
         assert low < LEFT < high < 1500.0
         assert result.known[0].severity == pytest.approx(0.88 * LIMIT, rel=0.03)

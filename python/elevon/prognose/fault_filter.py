@@ -235,8 +235,8 @@ class FaultFilter:
         weight = np.append(self.weight, self.dormant)
         weight = weight / weight.sum()
         mean = float(weight @ level)
-        own = np.append(pace**2 * self.cov[:, PROGRESS, PROGRESS], 0.0)
-        return mean, float(weight @ (own + (level - mean) ** 2))
+        inner = np.append(pace**2 * self.cov[:, PROGRESS, PROGRESS], 0.0)
+        return mean, float(weight @ (inner + (level - mean) ** 2))
 
     def update(self, seen: Seen) -> None:
         """Take in a diagnosis: a sighting, with its probability, or none."""

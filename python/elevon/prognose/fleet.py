@@ -230,15 +230,15 @@ def plan_fleet(
     }
     order = sorted(due, key=lambda name: alone[name])
     visits, cost = _grouped(order, tables, instants, costs.visit, failed)
-    rest = sum(value for name, value in left.items() if name not in due)
+    waiting = sum(value for name, value in left.items() if name not in due)
     single = sum(float(tables[name].min()) + costs.visit for name in due)
     return FleetPlan(
         next(iter(kinds)),
         units,
         alone,
         visits,
-        cost + rest,
-        single + rest + costs.visit * len(failed),
+        cost + waiting,
+        single + waiting + costs.visit * len(failed),
         far,
         costs.visit,
     )

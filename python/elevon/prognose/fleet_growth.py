@@ -79,7 +79,7 @@ class LearnedGrowth(Plain):
         Histories that showed it.
     trust : float
         Probability that a unit's growth follows the law.
-    beside, free : GrowthPrior
+    with_law, free : GrowthPrior
         Of units that follow the law, and that do not.
     life : float
         Use of a median life at a free rate.
@@ -94,7 +94,7 @@ class LearnedGrowth(Plain):
 
     units: int
     trust: float
-    beside: GrowthPrior
+    with_law: GrowthPrior
     free: GrowthPrior
     life: float
     form: tuple[tuple[float, float], ...] = ()
@@ -104,7 +104,7 @@ class LearnedGrowth(Plain):
     @property
     def spread(self) -> float:
         """Deviation of the logarithm of the rate, of most units."""
-        return self.beside.spread if self.trust >= _MOSTLY else self.free.spread
+        return self.with_law.spread if self.trust >= _MOSTLY else self.free.spread
 
     def law(self, law: Law) -> Law:
         """Return a law with what the fleet says of it."""
@@ -122,7 +122,7 @@ class LearnedGrowth(Plain):
         columns = _columns(covariates, self.covariates, "covariate")
         for name, effect in self.covariates.items():
             shift += effect * (columns.get(name, self.reference[name]) - self.reference[name])
-        return tuple(replace(p, rate=p.rate + shift) for p in (self.beside, self.free))  # type: ignore[return-value]
+        return tuple(replace(p, rate=p.rate + shift) for p in (self.with_law, self.free))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)
@@ -158,14 +158,14 @@ class FleetGrowth(Result):
     @property
     def headline(self) -> str:
         """The answer in one sentence."""
-        said = [
+        texts = [
             f"{key}: a median life of {item.life:.4g} {self.unit}, rates within a factor of "
             f"{np.exp(1.6449 * item.spread):.3g} (90 %)"
             for key, item in self.growth.items()
         ]
         if self.lives is not None:
-            said.append(f"lives: Weibull of shape {self.lives.shape:.3g}")
-        return f"{self.count} units, {self.failed} failed; {'; '.join(said)}."
+            texts.append(f"lives: Weibull of shape {self.lives.shape:.3g}")
+        return f"{self.count} units, {self.failed} failed; {'; '.join(texts)}."
 
     def tables(self, tables: ResponseTables) -> ResponseTables:
         """Return tables whose laws are as the fleet has them."""
@@ -257,11 +257,11 @@ def learn_fleet(
     growth: dict[str, LearnedGrowth] = {}
     if units and tables is not None:
         for k, law in enumerate(tables.laws):
-            shown = [item for item in units if _shows(item, law.key)]
-            if len(shown) < 2:
-                findings.append(f"{law.key}: {len(shown)} histories show it; 2 are needed")
+            showing = [item for item in units if _shows(item, law.key)]
+            if len(showing) < 2:
+                findings.append(f"{law.key}: {len(showing)} histories show it; 2 are needed")
                 continue
-            growth[law.key] = _learned(shown, tables, k, seed, progress)
+            growth[law.key] = _learned(showing, tables, k, seed, progress)
     distribution = fit_lives(
         np.array([item.use for item in lives]),
         np.array([item.failed for item in lives]),
@@ -296,23 +296,25 @@ def _learned(
         rate, spread, effect = _population(of_lives, exact, _WIDE, matrix[finished])
         learned = replace(
             learned, life=float(np.exp(-rate)), free=replace(free, spread=spread),
-            beside=replace(learned.beside, spread=spread), reference=reference,
+            with_law=replace(learned.with_law, spread=spread), reference=reference,
             covariates=dict(zip(names, effect.tolist(), strict=True)),
         )  # fmt: skip
-    said = _Fleet(units, tables, k, law, seed)
+    histories = _Fleet(units, tables, k, law, seed)
     tried = [(name, scale) for name, scales in _SCALES.items() for scale in scales]
-    best = said.evidence(learned)
+    best = histories.evidence(learned)
     for number, (name, scale) in enumerate(tried):
         other = replace(
             learned, free=_scaled(free, learned.free, name, scale),
-            beside=_scaled(BESIDE_LAW, learned.beside, name, scale),
+            with_law=_scaled(BESIDE_LAW, learned.with_law, name, scale),
         )  # fmt: skip
-        found = said.evidence(other)
+        found = histories.evidence(other)
         if found > best:
             best, learned = found, other
         if progress is not None and progress((number + 1) / len(tried)) is False:
             raise Interrupted("interrupted while growth was learnt")
-    return _updated(learned, said.filters(learned), said.process(learned), k, learned.life > 0.0)
+    return _updated(
+        learned, histories.filters(learned), histories.process(learned), k, learned.life > 0.0
+    )
 
 
 #: By how much what may differ from what is ASSUMED is tried, one after the other.
@@ -415,7 +417,7 @@ def _updated(
     """Return what all units together say of rates, unless their lives do, of scatter and misses."""
     trust = float(np.mean([item.by_law() for item in filters]))
     priors = []
-    for free, prior in ((False, learned.beside), (True, learned.free)):
+    for free, prior in ((False, learned.with_law), (True, learned.free)):
         if (1.0 - trust if free else trust) < _SEEN:
             priors.append(prior)
             continue
@@ -433,7 +435,7 @@ def _updated(
             known = replace(known, rate=rate, spread=spread)
         priors.append(known)
     life = learned.life or float(process.lives[k][-1])
-    return replace(learned, trust=trust, beside=priors[0], free=priors[1], life=life)
+    return replace(learned, trust=trust, with_law=priors[0], free=priors[1], life=life)
 
 
 def _moments(item: FaultFilter, free: bool) -> tuple[float, float]:
@@ -456,17 +458,17 @@ def _population(
     """
     share = np.minimum(variance / prior.spread**2, _KNOWN)  # of the prior in the posterior
     value = prior.rate + (mean - prior.rate) / (1.0 - share)
-    said = (1.0 - share) / np.maximum(variance, 1e-6)
+    precision = (1.0 - share) / np.maximum(variance, 1e-6)
     basis = np.column_stack((np.ones(len(mean)), matrix))
     spread = prior.spread
     effect: Floats = np.zeros(basis.shape[1])
     for _ in range(60):
-        weight = 1.0 / (spread**2 + 1.0 / said)
+        weight = 1.0 / (spread**2 + 1.0 / precision)
         normal = basis.T @ (weight[:, None] * basis) + np.diag([0.0, *[1e-3] * matrix.shape[1]])
         effect = np.asarray(np.linalg.solve(normal, basis.T @ (weight * value)), dtype=np.float64)
         off = value - basis @ effect
         shrunk = spread**2 * weight * off
-        left = spread**2 * (1.0 / said) * weight
+        left = spread**2 * (1.0 / precision) * weight
         spread = float(np.sqrt(np.mean(shrunk**2 + left)))
     free = max(len(mean) - basis.shape[1], 1)
     wider = np.sqrt((1.0 + 1.0 / len(mean)) * (free + 2.0) / free)

@@ -201,8 +201,8 @@ def draw_rates(
     rate = np.where(far, rng.uniform(-FAR_OFF, FAR_OFF, size=count), rate)
     normal = rng.standard_normal(count)
     one_sided = law.form_spread * np.abs(normal)
-    beside = of_law.slope + of_law.slope_spread * normal if of_law.slope_spread else one_sided
-    slope = np.where(free, of_free.slope + of_free.slope_spread * normal, beside)
+    of_law_slope = of_law.slope + of_law.slope_spread * normal if of_law.slope_spread else one_sided
+    slope = np.where(free, of_free.slope + of_free.slope_spread * normal, of_law_slope)
     near = np.where(free, (1.0 - _FAR_SHARE) / (1.0 - _FAR_DRAWN), 1.0)
     weight = np.where(far, _FAR_SHARE / _FAR_DRAWN, near)
     width = np.where(far, _FAR_WIDTH, np.minimum(_NARROW, 0.5 * spread))

@@ -194,7 +194,7 @@ def next_inspection(
     risk : float
         Accepted; at least what the number of futures can show.
     costs : Costs, optional
-        Of what is weighed; without them nothing is.
+        Of what is weighted; without them nothing is.
     test : str or None
         What to look with.
     assumed, findings

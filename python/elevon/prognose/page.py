@@ -96,11 +96,11 @@ def survival_figure(result: Prognosis) -> Figure:
 
 def sentence(result: Prognosis) -> str:
     """Return the answer in one sentence: what to do, then the remaining life of each branch."""
-    said = f"{result.action.text} {_remaining(result)}"
+    text = f"{result.action.text} {_remaining(result)}"
     if not result.off_law:
-        return said
+        return text
     worst = max(result.off_law, key=lambda item: abs(item.deviations))
-    return f"{said} The history contradicts the law: {worst.text}."
+    return f"{text} The history contradicts the law: {worst.text}."
 
 
 def _remaining(result: Prognosis) -> str:

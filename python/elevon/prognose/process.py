@@ -21,7 +21,7 @@ ONSET = 0.05
 """Rate at which a dormant fault begins to grow, for each e-fold of use. ASSUMED."""
 AHEAD = 0.5
 """Sudden changes of the rate to come, over those that a history is searched for. ASSUMED: what may
-have happened is weighed by inspections, what is to come only widens the answer."""
+have happened is weighted by inspections, what is to come only widens the answer."""
 
 _LONGEST = 0.3  # of a life: what may happen to a rate in a longer step counts as in that
 NUMBERS = ("damage", "growth", "slope", "wander", "drift", "memory", "changes", "path")
@@ -317,9 +317,9 @@ class Process:
         """Draw increments of gamma processes: mean D, variance D times the grain; and jumps."""
         out = mean.copy()
         for k, (shapes, law) in enumerate(zip(self.shapes, self.laws, strict=True)):
-            own = units.path[:, k] ** 2 * self.range[k]
+            spread = units.path[:, k] ** 2 * self.range[k]
             free = shapes.free[units.row[:, k]]
-            grain = np.where(free, own, law.grain)
+            grain = np.where(free, spread, law.grain)
             if grain.any():
                 scale = np.maximum(grain, 1e-300)
                 drawn = scale * rng.standard_gamma(np.minimum(mean[:, k] / scale, 1e12))
