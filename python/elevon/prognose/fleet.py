@@ -282,8 +282,8 @@ def _expected(
     cost = costs.early * lost + costs.late * failed
     if risk is None:
         return np.asarray(cost)
-    kept = failed <= risk
-    last = int(np.flatnonzero(kept)[-1]) if kept.any() else 0
+    allowed = failed <= risk
+    last = int(np.flatnonzero(allowed)[-1]) if allowed.any() else 0
     return np.asarray(np.where(np.arange(len(instants)) <= last, cost, np.inf))
 
 

@@ -307,9 +307,9 @@ def _learned(
             learned, free=_scaled(free, learned.free, name, scale),
             with_law=_scaled(BESIDE_LAW, learned.with_law, name, scale),
         )  # fmt: skip
-        found = histories.evidence(other)
-        if found > best:
-            best, learned = found, other
+        evidence = histories.evidence(other)
+        if evidence > best:
+            best, learned = evidence, other
         if progress is not None and progress((number + 1) / len(tried)) is False:
             raise Interrupted("interrupted while growth was learnt")
     return _updated(

@@ -239,7 +239,7 @@ def _cause(data: Mapping[str, Any], law: Law, place: str) -> _Cause | None:
     given = data.get("faults", [])
     if not isinstance(given, list):
         raise InputError(f"{place}: faults = {given!r} is not a list of causes")
-    found = []
+    causes = []
     for k, item in enumerate(given):
         cause = _Cause.from_dict(item, f"{place}: faults[{k}]")
         if not 0.0 <= cause.probability <= 1.0:
@@ -248,8 +248,8 @@ def _cause(data: Mapping[str, Any], law: Law, place: str) -> _Cause | None:
             )
         names = (FaultPlace(cause.kind, cause.place), *cause.ambiguous_with)
         if (law.kind, law.place) in names:
-            found.append(cause)
-    return max(found, key=lambda cause: cause.probability, default=None)
+            causes.append(cause)
+    return max(causes, key=lambda cause: cause.probability, default=None)
 
 
 def _detectable(data: Mapping[str, Any], law: Law, place: str) -> float | None:
