@@ -5,7 +5,7 @@ import pytest
 
 import elevon
 from elevon.campaign import load_plan, resolve_plan
-from elevon.campaign.split import dealt, leaks
+from elevon.campaign.resolved import dealt, leaks
 from elevon.errors import InputError
 
 POPULATION = """

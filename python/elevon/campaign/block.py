@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elevon.campaign.ends import ENDS, ends_table
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import plan_hash
-from elevon.campaign.store import MANIFEST, SCHEMA, block_description
+from elevon.campaign.store import ENDS, MANIFEST, SCHEMA, block_description, ends_table
 from elevon.errors import InputError, OutputError
 from elevon.features import feature_records
 from elevon.files import atomic_path, check_owned

@@ -10,10 +10,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from elevon.campaign.ends import last_values
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import RUNS, read_resolved
-from elevon.campaign.store import Manifest, read_manifest, repair_hint, work_log
+from elevon.campaign.store import Manifest, last_values, read_manifest, repair_hint, work_log
 from elevon.errors import FormatError, InputError, unknown
 from elevon.recording import Channel, Clock, Recording
 from elevon.recording.contents import warn_of_old_names

@@ -27,9 +27,8 @@ from elevon.campaign.folder import (
     stage_tables,
     whole_blocks,
 )
-from elevon.campaign.resolved import Resolved
+from elevon.campaign.resolved import Resolved, split_index
 from elevon.campaign.resolved_file import LONGEST, RUNS, plan_hash, planned, read_table, rebuilt
-from elevon.campaign.split import split_index
 from elevon.campaign.store import (
     LOG,
     MANIFEST,

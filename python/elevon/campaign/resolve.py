@@ -16,8 +16,7 @@ from elevon.arrays import Floats
 from elevon.campaign.design import Points, design_points
 from elevon.campaign.draw import axis_values, column_of, random_values, ranged
 from elevon.campaign.grammar import Axis, Growth, Plan, Population, Spread, Target
-from elevon.campaign.resolved import CaseChanges, Embedder, Index, Resolved
-from elevon.campaign.split import split_index
+from elevon.campaign.resolved import CaseChanges, Embedder, Index, Resolved, split_index
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError
 from elevon.faults import Fault

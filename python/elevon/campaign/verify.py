@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from elevon.campaign.dataset import Dataset, load_campaign
-from elevon.campaign.ends import ENDS
+from elevon.campaign.resolved import leaks
 from elevon.campaign.resolved_file import read_resolved
-from elevon.campaign.split import leaks
-from elevon.campaign.store import MANIFEST
+from elevon.campaign.store import ENDS, MANIFEST
 from elevon.errors import FormatError, InputError
 from elevon.report import Check
 from elevon.worklog import Item
