@@ -154,7 +154,7 @@ def test_populations_that_cannot_be_name_the_place(plan, name):
 
 
 def test_a_bound_beyond_floats_is_refused():
-    from elevon.campaign.draw import _split
+    from elevon.campaign.draw import _number_and_unit
 
     with pytest.raises(InputError, match=r"random.draw\[0\]: a whole number of 1329 bits is too"):
-        _split(10**400, "random.draw[0]")
+        _number_and_unit(10**400, "random.draw[0]")

@@ -13,7 +13,7 @@ from elevon import Actuator
 from elevon.campaign import load_campaign
 from elevon.diagnose.engine.days import drawn
 from elevon.diagnose.learning.examples import Examples, examples_of_dataset
-from elevon.diagnose.learning.fit import _conformal, learned_classes
+from elevon.diagnose.learning.fit import _conformal_error, learned_classes
 from elevon.diagnose.learning.labels import LabelledLog, read_labels
 from elevon.diagnose.learning.model import LearnedModel, fault_logits
 from elevon.diagnose.learning.motion import KnownMotion, LoggedMotion
@@ -465,5 +465,5 @@ def test_the_logit_of_any_fault_sums_the_faults():
 
 
 def test_an_interval_holds_the_rank_of_the_next_error():
-    assert _conformal(np.arange(1.0, 10.0)) == 9.0
-    assert _conformal(np.arange(1.0, 20.0)) == 18.0
+    assert _conformal_error(np.arange(1.0, 10.0)) == 9.0
+    assert _conformal_error(np.arange(1.0, 20.0)) == 18.0

@@ -85,7 +85,7 @@ def separate(
         residual = values - head @ (head.T @ values)
         if np.linalg.norm(residual) < 1e-6 * np.linalg.norm(values):
             blocked.append(name)
-        elif (same := _same(residual, terms, head)) is not None:
+        elif (same := _equal_columns(residual, terms, head)) is not None:
             same[0].aliases.append((name, same[1]))
         else:
             terms.append(TermColumn(name, values))
@@ -96,7 +96,7 @@ def separate(
     return terms, blocked, partial
 
 
-def _same(
+def _equal_columns(
     residual: Floats, terms: Sequence[TermColumn], head: Floats
 ) -> tuple[TermColumn, float] | None:
     for term in terms:
@@ -262,9 +262,9 @@ def effects_of(response: CampaignResponse, *, level: float = 0.95) -> Effects:
             f"and {head.shape[1]} block(s) apart"
         )
     fit = _fit(matrix, head.shape[1], response)
-    judged = _judged(fit, response, coded, level)
+    judged = _with_intervals(fit, response, coded, level)
     rows = [
-        _row(term, effect, margin, letters, response)
+        _effect_row(term, effect, margin, letters, response)
         for term, effect, margin in zip(terms, fit.effects, judged.margins, strict=True)
     ]
     return Effects(
@@ -278,12 +278,12 @@ def effects_of(response: CampaignResponse, *, level: float = 0.95) -> Effects:
         margin=judged.margins[0] if rows else None,
         df=judged.df,
         mean=float(response.values.mean()),
-        factors=[_about(factor) for factor in response.factors],
+        factors=[_describe_effects(factor) for factor in response.factors],
         terms=sorted(rows, key=lambda row: -abs(row.effect)),
         blocks=head.shape[1],
         with_blocks=response.with_blocks,
-        blocked=[_word(name, letters) for name in blocked],
-        partial=[_word(name, letters) for name in partial],
+        blocked=[_term_text(name, letters) for name in blocked],
+        partial=[_term_text(name, letters) for name in partial],
         equal_repeats=_equal_repeats(*_pure_error(response, coded), response),
     )
 
@@ -314,20 +314,24 @@ def _fit(matrix: Floats, head: int, response: CampaignResponse) -> _Fit:
     return _Fit(matrix, head, effects, scale, response.values - matrix @ solution)
 
 
-def _judged(fit: _Fit, response: CampaignResponse, coded: list[Floats], level: float) -> _Judged:
+def _with_intervals(
+    fit: _Fit, response: CampaignResponse, coded: list[Floats], level: float
+) -> _Judged:
     """Judge the effects by repeats, by Lenth's method or by the residual."""
     spread, df = _pure_error(response, coded)
     if df >= 1 and not _equal_repeats(spread, df, response):
-        return _by_t("replicates", spread, df, fit, level)
+        return _student_intervals("replicates", spread, df, fit, level)
     if _orthogonal(fit, coded):
-        return _by_lenth(fit, response, coded, level)
-    df = len(_points(coded)[0]) - fit.matrix.shape[1]
+        return _lenth_intervals(fit, response, coded, level)
+    df = len(_distinct_points(coded)[0]) - fit.matrix.shape[1]
     if df >= 1:
-        return _by_t("residual", float(np.sqrt(fit.residual @ fit.residual / df)), df, fit, level)
+        return _student_intervals(
+            "residual", float(np.sqrt(fit.residual @ fit.residual / df)), df, fit, level
+        )
     return _Judged("none", None, None, [None] * len(fit.effects))
 
 
-def _points(coded: list[Floats]) -> tuple[Floats, npt.NDArray[np.int64]]:
+def _distinct_points(coded: list[Floats]) -> tuple[Floats, npt.NDArray[np.int64]]:
     """Return the different points, and which of them each run has."""
     points, number = np.unique(np.column_stack(coded).round(12), axis=0, return_inverse=True)
     return points, number.reshape(-1)
@@ -343,7 +347,7 @@ def _equal_repeats(spread: float, df: int, response: CampaignResponse) -> bool:
 
 def _pure_error(response: CampaignResponse, coded: list[Floats]) -> tuple[float, int]:
     """Return the deviation of runs of one point, less the blocks, and its degrees of freedom."""
-    points = _points(coded)[1]
+    points = _distinct_points(coded)[1]
     indicators = (points[:, None] == np.arange(points.max() + 1)).astype(np.float64)
     matrix = np.column_stack([blocks_matrix(response.block), indicators])
     df = len(points) - int(np.linalg.matrix_rank(matrix))
@@ -353,7 +357,7 @@ def _pure_error(response: CampaignResponse, coded: list[Floats]) -> tuple[float,
     return float(np.sqrt(residual @ residual / df)), df
 
 
-def _by_t(method: str, spread: float, df: int, fit: _Fit, level: float) -> _Judged:
+def _student_intervals(method: str, spread: float, df: int, fit: _Fit, level: float) -> _Judged:
     from scipy.stats import t
 
     quantile = float(t.ppf(0.5 + 0.5 * level, df))
@@ -368,7 +372,9 @@ def _orthogonal(fit: _Fit, coded: list[Floats]) -> bool:
     return two and np.allclose(products, np.diag(np.diag(products)), atol=1e-6 * len(fit.matrix))
 
 
-def _by_lenth(fit: _Fit, response: CampaignResponse, coded: list[Floats], level: float) -> _Judged:
+def _lenth_intervals(
+    fit: _Fit, response: CampaignResponse, coded: list[Floats], level: float
+) -> _Judged:
     from scipy.stats import t
 
     further = further_contrasts(fit.matrix, coded)
@@ -383,7 +389,7 @@ def _by_lenth(fit: _Fit, response: CampaignResponse, coded: list[Floats], level:
     return _Judged("lenth", error, df, [margin] * len(fit.effects))
 
 
-def _row(
+def _effect_row(
     term: TermColumn,
     effect: float,
     margin: float | None,
@@ -392,22 +398,22 @@ def _row(
 ) -> EffectEstimate:
     effect = float(effect)
     return EffectEstimate(
-        _word(term.factors, letters),
+        _term_text(term.factors, letters),
         " x ".join(response.factors[k].name for k in term.factors),
         effect,
         effect - margin if margin is not None else None,
         effect + margin if margin is not None else None,
         abs(effect) > margin if margin is not None else None,
-        [("-" if sign < 0 else "") + _word(name, letters) for name, sign in term.aliases],
+        [("-" if sign < 0 else "") + _term_text(name, letters) for name, sign in term.aliases],
     )
 
 
-def _word(name: tuple[int, ...], letters: list[str]) -> str:
+def _term_text(name: tuple[int, ...], letters: list[str]) -> str:
     parts = [letters[k] for k in name]
     return "".join(parts) if all(len(part) == 1 for part in parts) else ":".join(parts)
 
 
-def _about(factor: Any) -> dict[str, Any]:
+def _describe_effects(factor: Any) -> dict[str, Any]:
     return {
         "letter": factor.letter,
         "name": factor.name,

@@ -86,14 +86,14 @@ def read_response(ds: Dataset, name: str) -> CampaignResponse:
         Nothing varies, or no run has a value.
     """
     runs = ds.runs.to_arrow()
-    values, unit = _values(ds, name, runs)
+    values, unit = _response_values(ds, name, runs)
     ended = np.isin(runs["status"].to_pylist(), ["ok", "tripped"])
     good = np.isfinite(values) & ended
     numbers = runs["run"].to_numpy()
     if not good.any():
         raise InputError(f"{ds.folder}: no run has a value of {name!r}")
     block = runs["block"].to_numpy()[good]
-    factors, with_blocks = _factors(ds, runs, good, block)
+    factors, with_blocks = _varied_factors(ds, runs, good, block)
     if not factors:
         raise InputError(f"{ds.folder}: nothing varies among the runs with a value of {name!r}")
     return CampaignResponse(
@@ -109,7 +109,7 @@ def read_response(ds: Dataset, name: str) -> CampaignResponse:
     )
 
 
-def _values(ds: Dataset, name: str, runs: Any) -> tuple[Floats, str]:
+def _response_values(ds: Dataset, name: str, runs: Any) -> tuple[Floats, str]:
     """Return the response of every run, NaN where there is none."""
     known = ["sim_s"]
     values = np.full(len(ds), np.nan)
@@ -127,7 +127,7 @@ def _values(ds: Dataset, name: str, runs: Any) -> tuple[Floats, str]:
     raise unknown("response", name, known, f"{ds.folder}")
 
 
-def _factors(
+def _varied_factors(
     ds: Dataset, runs: Any, good: npt.NDArray[np.bool_], block: Ints
 ) -> tuple[list[VariedFactor], list[str]]:
     design = {item["name"]: item for item in ds.manifest.design.get("factors", [])}
@@ -136,10 +136,10 @@ def _factors(
     free = (letter for letter in "ABCDEFGHJKLMNOPQRSTUVWXYZ" if letter not in taken)
     for column in ds.manifest.columns:
         name = column["name"]
-        values, levels = _numbers(runs[name], good)
+        values, levels = _numeric_levels(runs[name], good)
         if len(levels) < 2:
             continue
-        if len(np.unique(block)) > 1 and _follows(values, block):
+        if len(np.unique(block)) > 1 and _varies_with_blocks(values, block):
             with_blocks.append(name)
             continue
         known = design.get(name)
@@ -150,7 +150,7 @@ def _factors(
     return factors, with_blocks
 
 
-def _numbers(column: Any, good: npt.NDArray[np.bool_]) -> tuple[Floats, tuple[Any, ...]]:
+def _numeric_levels(column: Any, good: npt.NDArray[np.bool_]) -> tuple[Floats, tuple[Any, ...]]:
     """Return a column as numbers: its own, or the place of each among its sorted values."""
     values = np.array(column.to_pylist(), dtype=object)[good]
     if all(isinstance(value, (int, float)) for value in values):
@@ -161,6 +161,6 @@ def _numbers(column: Any, good: npt.NDArray[np.bool_]) -> tuple[Floats, tuple[An
     return np.array([float(place[str(value)]) for value in values]), tuple(levels)
 
 
-def _follows(values: Floats, block: Ints) -> bool:
+def _varies_with_blocks(values: Floats, block: Ints) -> bool:
     """Return whether a quantity has one value in each block."""
     return all(len(np.unique(values[block == number])) == 1 for number in np.unique(block))

@@ -130,7 +130,7 @@ def block_tables(
     """Return a block's tables by folder: ``runs/CLOCK`` of each clock, ``features``, ``ends``."""
     clocks = {clock.name: clock for item in prepared for clock in item.plan}
     tables = {
-        f"runs/{name}": _signals(resolved, clock, numbers, prepared, results)
+        f"runs/{name}": _sample_table(resolved, clock, numbers, prepared, results)
         for name, clock in clocks.items()
     }
     if resolved.features:
@@ -224,11 +224,11 @@ def simulate_block(
             try:
                 results += simulate_prepared([item], progress=progress, **options)  # type: ignore[arg-type]
             except InputError as error:
-                results.append(_refused(item, str(error)))
+                results.append(_refused_result(item, str(error)))
         return results
 
 
-def _refused(prepared: Prepared, reason: str) -> CoreResult:
+def _refused_result(prepared: Prepared, reason: str) -> CoreResult:
     columns = len(prepared.core["faults"])
     clocks: dict[str, CoreRows] = {
         clock.name: {"time": np.empty(0), "values": np.empty((0, len(clock.signals) + columns))}
@@ -240,7 +240,7 @@ def _refused(prepared: Prepared, reason: str) -> CoreResult:
     }  # fmt: skip
 
 
-def _signals(
+def _sample_table(
     resolved: Resolved,
     clock: ClockPlan,
     numbers: Sequence[int],
@@ -260,12 +260,12 @@ def _signals(
     columns = {"run": runs, "time": np.concatenate([rows["time"] for _, _, rows in parts])}
     values = np.concatenate([rows["values"][:, : len(clock.signals)] for _, _, rows in parts])
     columns.update({name: values[:, k].copy() for k, name in enumerate(clock.signals)})
-    columns.update(_severities(resolved, clock, parts, lengths))
+    columns.update(_severity_columns(resolved, clock, parts, lengths))
     schema = signal_schema(resolved, clock, parts[0][1].command_unit)
     return pa.Table.from_arrays([pa.array(columns[name]) for name in schema.names], schema=schema)
 
 
-def _severities(
+def _severity_columns(
     resolved: Resolved, clock: ClockPlan, parts: Sequence[Any], lengths: Any
 ) -> dict[str, Any]:
     """Return each fault's severity as it was applied at each sample; 0 in a run without it."""

@@ -57,8 +57,8 @@ def describe(ds: Dataset) -> dict[str, object]:
         "seeds": len(set(table["seed"].to_pylist())),
         "blocks": len(set(table["block"].to_pylist())),
         "replicates": len(set(table["replicate"].to_pylist())),
-        "healthy": _healthy(ds, table),
-        "faults": [_fault(item, table) for item in manifest.faults],
+        "healthy": _healthy_run(ds, table),
+        "faults": [_typical_fault_run(item, table) for item in manifest.faults],
         "varied": [
             {**item, **distribution(table[item["name"]])}
             for item in manifest.columns
@@ -81,7 +81,7 @@ def distribution(column: pa.ChunkedArray) -> dict[str, object]:
     if not str(column.type).startswith(("double", "int")):
         return {"counts": counted([str(value) for value in column.to_pylist()])}
     values = column.to_numpy().astype(np.float64)
-    return _spread(values)
+    return _spread_of(values)
 
 
 def typical_runs(ds: Dataset, most: int = 12) -> dict[str, tuple[int, int]]:
@@ -108,13 +108,13 @@ def typical_runs(ds: Dataset, most: int = 12) -> dict[str, tuple[int, int]]:
     return pairs
 
 
-def _fault(item: dict[str, Any], table: Any) -> dict[str, Any]:
+def _typical_fault_run(item: dict[str, Any], table: Any) -> dict[str, Any]:
     values = table[item["name"]].to_numpy()
     present = values[values != 0.0]
-    return {**item, "runs": len(present), **(_spread(present) if len(present) else {})}
+    return {**item, "runs": len(present), **(_spread_of(present) if len(present) else {})}
 
 
-def _healthy(ds: Dataset, table: Any) -> int:
+def _healthy_run(ds: Dataset, table: Any) -> int:
     faulty = np.zeros(table.num_rows, dtype=bool)
     for item in ds.manifest.faults:
         faulty |= table[item["name"]].to_numpy() != 0.0
@@ -128,7 +128,7 @@ def _features(ds: Dataset) -> list[str]:
         return []
 
 
-def _spread(values: npt.NDArray[np.float64]) -> dict[str, Any]:
+def _spread_of(values: npt.NDArray[np.float64]) -> dict[str, Any]:
     low, high = float(values.min()), float(values.max())
     counts, _ = np.histogram(values, _BINS, (low, high) if high > low else (low - 0.5, low + 0.5))
     quarter, middle, third = (float(q) for q in np.quantile(values, [0.25, 0.5, 0.75]))
@@ -150,7 +150,7 @@ def card_texts(ds: Dataset) -> dict[str, str]:
     return {"README.md": _markdown(about, ds), "card.html": _page(about, ds)}
 
 
-def _facts(about: dict[str, Any]) -> list[str]:
+def _first_lines(about: dict[str, Any]) -> list[str]:
     """Return the card's first lines."""
     facts = [
         f"Simulated with elevon {about['version']}: {about['actuator']}, {about['fidelity']} "
@@ -191,11 +191,11 @@ _BARS = " ▁▂▃▄▅▆▇█"
 
 
 def _fault_rows(about: dict[str, Any]) -> list[list[object]]:
-    return [[f["name"], f["unit"], f["runs"], *_shape(f)] for f in about["faults"]]
+    return [[f["name"], f["unit"], f["runs"], *_distribution_text(f)] for f in about["faults"]]
 
 
 def _varied_rows(about: dict[str, Any]) -> list[list[object]]:
-    return [[v["name"], v["role"], v["unit"], *_shape(v)] for v in about["varied"]]
+    return [[v["name"], v["role"], v["unit"], *_distribution_text(v)] for v in about["varied"]]
 
 
 def _column_rows(about: dict[str, Any]) -> list[tuple[str, list[list[object]]]]:
@@ -206,7 +206,7 @@ def _column_rows(about: dict[str, Any]) -> list[tuple[str, list[list[object]]]]:
     ]
 
 
-def _shape(item: dict[str, Any]) -> list[object]:
+def _distribution_text(item: dict[str, Any]) -> list[object]:
     """Return smallest, median and largest value, and the histogram as a line of bars."""
     if "counts" in item:
         return ["", "", "", _counts(dict(list(item["counts"].items())[:6]))]
@@ -228,7 +228,7 @@ def _markdown(about: dict[str, Any], ds: Dataset) -> str:
     source = (files("elevon.campaign") / "card.md.j2").read_text("utf-8")
     text = environment.from_string(source).render(
         about=about,
-        facts=_facts(about),
+        facts=_first_lines(about),
         code=_code(ds),
         clocks=ds.clocks,
         failed=_failed(about),
@@ -273,7 +273,7 @@ def _page(about: dict[str, Any], ds: Dataset) -> str:
     report = Report(about["name"], about["text"] or "Simulated runs of one actuator.")
     report.fact("runs", str(about["runs"]), _counts(about["statuses"]))
     report.fact("size", format_bytes(about["bytes"]))
-    section = report.section("What is in it").points(_facts(about))
+    section = report.section("What is in it").points(_first_lines(about))
     section.code(_code(ds))
     if about["faults"]:
         table = ReportTable(

@@ -80,22 +80,24 @@ def check(resolved: Resolved, progress: Callable[[float], object] | None = None)
         checked.sizes[number] = prepared.bytes
         checked.steps[number] = round(prepared.core["duration"] / prepared.step)
         checked.clocks.update({clock.name: clock for clock in prepared.plan})
-        for path, notice in _together(resolved, number, prepared.core["parameters"]):
+        for path, notice in _core_findings(resolved, number, prepared.core["parameters"]):
             findings.setdefault(path, (number, notice))
-        if (sign := (resolved.structure(number), _signature(resolved, number))) not in seen:
+        if (
+            sign := (resolved.structure(number), _resting_parameters(resolved, number))
+        ) not in seen:
             seen.add(sign)
-            for notice in _idle(resolved, number):
+            for notice in _settings_without_effect(resolved, number):
                 idle.setdefault(notice, number)
         if progress is not None and number % 256 == 0 and progress(number / count) is False:
             raise Interrupted(f"interrupted while run {number} of {count} was checked")
     report(
         [[Notice(FindingWarning, f"run {n}: {d.text}") for n, d in findings.values()]], strict=False
     )
-    return replace(checked, idle=_reported(resolved, idle))
+    return replace(checked, idle=_report_without_effect(resolved, idle))
 
 
 def borders(sizes: npt.NDArray[np.int64], most: int | None) -> list[int]:
-    """Return where blocks begin, and the end: they follow from the runs alone.
+    """Return the first run of each block, and one past the last run: the runs alone decide it.
 
     Parameters
     ----------
@@ -149,7 +151,7 @@ def _check_range(resolved: Resolved, column: Column) -> None:
             record_of_fault(column.name, resolved.wiring).read_severity(value, place)
 
 
-def _together(
+def _core_findings(
     resolved: Resolved, number: int, vector: npt.NDArray[np.float64]
 ) -> Iterator[tuple[str, Notice]]:
     """Yield the core's findings about a run's values together; what it refuses is an error."""
@@ -161,8 +163,8 @@ def _together(
         yield str(finding["path"]), Notice(FindingWarning, str(finding["message"]))
 
 
-def _signature(resolved: Resolved, number: int) -> tuple[int, ...]:
-    """Return which parameters are at rest: whether something acts depends on no more of them."""
+def _resting_parameters(resolved: Resolved, number: int) -> tuple[int, ...]:
+    """Return which varied parameters are zero or unchanged: what acts depends on no others."""
     known = resolved.actuator.parameters
     signs = []
     for column in resolved.columns:
@@ -172,7 +174,7 @@ def _signature(resolved: Resolved, number: int) -> tuple[int, ...]:
     return tuple(signs)
 
 
-def _idle(resolved: Resolved, number: int) -> Iterator[Notice]:
+def _settings_without_effect(resolved: Resolved, number: int) -> Iterator[Notice]:
     """Yield what is set in a run where it has no effect."""
     run = resolved.run(number)
     actuator = run.actuator.with_values(run.scenario.parameters, source="scenario")
@@ -180,7 +182,7 @@ def _idle(resolved: Resolved, number: int) -> Iterator[Notice]:
     yield from not_acting(actuator, compiled, resolved.fidelity)
 
 
-def _reported(resolved: Resolved, idle: dict[Notice, int]) -> list[str]:
+def _report_without_effect(resolved: Resolved, idle: dict[Notice, int]) -> list[str]:
     """Refuse what has no effect, or report it where the plan allows it; return the list."""
     if idle and not resolved.allow_not_acting:
         notice, number = next(iter(idle.items()))
@@ -244,7 +246,7 @@ class Cost:
 
     def __str__(self) -> str:
         return (
-            f"{self.runs} runs in {self.blocks} block(s); about {_duration(self.seconds)}, at "
+            f"{self.runs} runs in {self.blocks} block(s); about {_duration_text(self.seconds)}, at "
             f"most {format_bytes(self.memory)} of memory at a time, {format_bytes(self.disk)} of "
             "data"
         )
@@ -262,7 +264,7 @@ def estimate(resolved: Resolved, checked: Checked, folder: Path, threads: int) -
     memory = check_memory(checked, edges)
     disk = int(checked.sizes.sum())
     check_disk(folder, disk)
-    seconds = _seconds(resolved, checked, threads)
+    seconds = _estimate_seconds(resolved, checked, threads)
     return Cost(len(resolved), len(edges) - 1, edges, disk, memory, seconds, checked)
 
 
@@ -277,13 +279,13 @@ def check_disk(folder: Path, need: int) -> None:
         )
 
 
-def _seconds(resolved: Resolved, checked: Checked, threads: int) -> float:
+def _estimate_seconds(resolved: Resolved, checked: Checked, threads: int) -> float:
     """Extrapolate from the first milliseconds of some runs, spread over the plan."""
     import time
 
     count = min(_PILOT_RUNS, len(resolved))
     chosen = np.linspace(0, len(resolved) - 1, count).astype(int)
-    pilots = [_cut(resolved.prepared(int(number))) for number in chosen]
+    pilots = [_pilot_run(resolved.prepared(int(number))) for number in chosen]
     start = time.perf_counter()
     results = simulate_prepared(pilots, fidelity=resolved.fidelity, threads=1)
     spent = time.perf_counter() - start
@@ -292,12 +294,12 @@ def _seconds(resolved: Resolved, checked: Checked, threads: int) -> float:
     return work / min(threads, checked_threads(None))
 
 
-def _cut(prepared: Any) -> Any:
+def _pilot_run(prepared: Any) -> Any:
     duration = min(prepared.core["duration"], _PILOT_STEPS * prepared.step)
     return replace(prepared, core={**prepared.core, "duration": duration})
 
 
-def _duration(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     if seconds < 90.0:
         return f"{seconds:.2g} s"
     return f"{seconds / 60.0:.2g} min" if seconds < 5400.0 else f"{seconds / 3600.0:.3g} h"

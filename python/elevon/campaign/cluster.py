@@ -59,7 +59,7 @@ def check_scheduler(address: str) -> None:
     outcome: list[bytes | OSError | UnicodeError] = []
     place = (parts[2].strip("[]"), int(parts[3]))
     # In a thread of its own: to look up a name may take longer than any limit of a connection.
-    probe = Thread(target=lambda: outcome.append(_probed(place, tls=tls)), daemon=True)
+    probe = Thread(target=lambda: outcome.append(_probe(place, tls=tls)), daemon=True)
     probe.start()
     probe.join(LIMIT / 2.0)
     answer = outcome[0] if outcome else TimeoutError()
@@ -73,16 +73,16 @@ def check_scheduler(address: str) -> None:
         raise InputError(f"--scheduler {address}: what answers there is no Dask scheduler")
 
 
-def _probed(place: tuple[str, int], *, tls: bool) -> bytes | OSError | UnicodeError:
+def _probe(place: tuple[str, int], *, tls: bool) -> bytes | OSError | UnicodeError:
     """Return the first bytes of whoever listens at a place, or the error."""
     try:
         with socket.create_connection(place, timeout=LIMIT / 4.0) as peer:
-            return b"" if tls else _first(peer)
+            return b"" if tls else _read_first_bytes(peer)
     except (OSError, UnicodeError) as error:
         return error
 
 
-def _first(peer: socket.socket) -> bytes:
+def _read_first_bytes(peer: socket.socket) -> bytes:
     """Return the first eight bytes of a peer, fewer where it closes."""
     data = b""
     while len(data) < 8:
@@ -135,19 +135,19 @@ def in_cluster(
     if not work.missing:
         return
     waiting = iter(work.missing)
-    with _client(address) as client:
+    with _connect_client(address) as client:
         workers = _Workers(client, address, announce)
         slots = _AHEAD * max(workers.count(), 1)
-        pending = {_submitted(client, work, block) for block in islice(waiting, slots)}
+        pending = {_submit(client, work, block) for block in islice(waiting, slots)}
         while pending:
-            finished = _finished(pending)
+            finished = _await_blocks(pending)
             workers.look(idle=not finished)
             check_there(work.folder)
             for future in finished:
-                work.log.add(_result(future, address))
+                work.log.add(_block_result(future, address))
                 pending.discard(future)
-                pending |= {_submitted(client, work, block) for block in islice(waiting, 1)}
-            if progress is not None and progress(_fraction(work)) is False:
+                pending |= {_submit(client, work, block) for block in islice(waiting, 1)}
+            if progress is not None and progress(_done_fraction(work)) is False:
                 raise Interrupted("interrupted between two blocks")
 
 
@@ -155,16 +155,16 @@ class _Workers:
     """Watches the scheduler: whether it answers, and whether anybody works for it."""
 
     def __init__(self, client: Client, address: str, announce: Callable[[str], Any] | None) -> None:
-        self._client, self._address, self._announce = client, address, announce
+        self._connect_client, self._address, self._announce = client, address, announce
         self._seen = time.monotonic()
         self._waits = False
 
     def count(self) -> int:
         try:
-            about = self._client.scheduler_info()
+            about = self._connect_client.scheduler_info()
         # The library has a dozen errors for a scheduler that has gone.
         except Exception as error:
-            raise _lost(self._address, f": {type(error).__name__}") from error
+            raise _scheduler_gone(self._address, f": {type(error).__name__}") from error
         return int(about.get("n_workers", len(about["workers"])))
 
     def look(self, *, idle: bool) -> None:
@@ -172,16 +172,16 @@ class _Workers:
         if not idle:
             self._seen, self._waits = time.monotonic(), False
             return
-        if self._client.status == "running" and self._answers():
+        if self._connect_client.status == "running" and self._greets():
             self._seen = time.monotonic()
             waits = self.count() == 0
             if waits and not self._waits and self._announce is not None:
                 self._announce("waiting for workers (0)")
             self._waits = waits
-        elif self._client.status == "closed" or time.monotonic() - self._seen > LIMIT / 2.0:
-            raise _lost(self._address)
+        elif self._connect_client.status == "closed" or time.monotonic() - self._seen > LIMIT / 2.0:
+            raise _scheduler_gone(self._address)
 
-    def _answers(self) -> bool:
+    def _greets(self) -> bool:
         """Return whether the scheduler greets who connects: one that is halted keeps the line."""
         if _LOCAL.fullmatch(self._address):
             return True
@@ -192,7 +192,7 @@ class _Workers:
         return True
 
 
-def _finished(pending: set[Any]) -> set[Any]:
+def _await_blocks(pending: set[Any]) -> set[Any]:
     """Wait a moment for blocks that are done, or have failed; there may be none."""
     end = time.monotonic() + _MOMENT
     while time.monotonic() < end:
@@ -202,7 +202,7 @@ def _finished(pending: set[Any]) -> set[Any]:
     return set()
 
 
-def _result(future: Any, address: str) -> Item:
+def _block_result(future: Any, address: str) -> Item:
     """Return what a worker has made of a block, or its error."""
     try:
         item: Item = future.result(timeout=LIMIT)
@@ -212,11 +212,11 @@ def _result(future: Any, address: str) -> Item:
         raise OutputError(f"--scheduler {address}: a worker has not enough memory") from error
     # The library has a dozen errors for a scheduler or a worker that is gone.
     except Exception as error:
-        raise _lost(address, f": {type(error).__name__}: {error}") from error
+        raise _scheduler_gone(address, f": {type(error).__name__}: {error}") from error
     return item
 
 
-def _lost(address: str, why: str = "") -> OutputError:
+def _scheduler_gone(address: str, why: str = "") -> OutputError:
     return OutputError(
         f"--scheduler {address}: no longer answers{why}; what is done is kept: give the command "
         "again, or elevon campaign resume"
@@ -233,42 +233,42 @@ def worker_block(folder: str, core: str, index: int, first: int, last: int) -> I
     """
     if core_hash() != core:
         raise InputError("a worker has another build of elevon than the campaign")
-    return run_block(_plan(folder), Path(folder), index, range(first, last), threads=1)
+    return run_block(_read_plan(folder), Path(folder), index, range(first, last), threads=1)
 
 
 @lru_cache(maxsize=2)
-def _plan(folder: str) -> Resolved:
+def _read_plan(folder: str) -> Resolved:
     return read_resolved(Path(folder))
 
 
-def _submitted(client: Client, work: CampaignWork, block: int) -> Any:
+def _submit(client: Client, work: CampaignWork, block: int) -> Any:
     numbers = work.numbers(block)
     folder = str(work.folder.absolute())
     arguments = (folder, work.manifest.core, block, numbers.start, numbers.stop)
     return client.submit(worker_block, *arguments, pure=False)
 
 
-def _fraction(work: CampaignWork) -> float:
+def _done_fraction(work: CampaignWork) -> float:
     return len(work.log.items) / (len(work.edges) - 1)
 
 
 @contextmanager
-def _client(address: str) -> Iterator[Client]:
+def _connect_client(address: str) -> Iterator[Client]:
     try:
         distributed: Any = import_module("distributed")
     except ImportError as error:
         raise InputError("a cluster needs the extra 'cluster' (distributed)") from error
     local = _LOCAL.fullmatch(address)
     wait = {"distributed.comm.timeouts.connect": LIMIT / 2.0, "distributed.comm.retry.count": 0}
-    with _quiet(), import_module("dask").config.set(wait):
+    with _silence_library_log(), import_module("dask").config.set(wait):
         if local is None:
             check_scheduler(address)
-            with _connected(distributed, address) as client:
+            with _connect(distributed, address) as client:
                 yield client
             return
         with (
             distributed.LocalCluster(
-                n_workers=_checked(address, int(local[1])), **_OPTIONS
+                n_workers=_check_workers(address, int(local[1])), **_OPTIONS
             ) as cluster,
             distributed.Client(cluster, set_as_default=False) as client,
         ):
@@ -283,14 +283,14 @@ _OPTIONS = {
 }
 
 
-def _checked(address: str, count: int) -> int:
+def _check_workers(address: str, count: int) -> int:
     if not 1 <= count <= _MOST_WORKERS:
         raise InputError(f"--cluster {address}: {count} workers is outside 1 to {_MOST_WORKERS}")
     return count
 
 
 @contextmanager
-def _connected(distributed: Any, address: str) -> Iterator[Client]:
+def _connect(distributed: Any, address: str) -> Iterator[Client]:
     """Connect to a scheduler that has answered already; leave it without waiting for it."""
     try:
         client = distributed.Client(address, timeout=LIMIT / 2.0, set_as_default=False)
@@ -306,7 +306,7 @@ def _connected(distributed: Any, address: str) -> Iterator[Client]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _silence_library_log() -> Iterator[None]:
     """Keep the library's own log, with its tracebacks, off standard error."""
     log = logging.getLogger("distributed")
     before, log.level = log.level, logging.CRITICAL + 1

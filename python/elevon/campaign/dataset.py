@@ -51,12 +51,15 @@ class Part:
             raise FormatError(
                 f"{self.path}: cannot be read: {error.strerror}{self.remedy}"
             ) from error
-        if self.about is not None and _mark(self.path, stat.st_mtime_ns) != self.about["sha256"]:
+        if (
+            self.about is not None
+            and _file_state(self.path, stat.st_mtime_ns) != self.about["sha256"]
+        ):
             raise FormatError(f"{self.path}: is not as it was written (SHA-256){self.remedy}")
 
 
 @lru_cache(maxsize=4096)
-def _mark(path: Path, stamp: int) -> str:  # noqa: ARG001 - a changed file is read anew
+def _file_state(path: Path, stamp: int) -> str:  # noqa: ARG001 - a changed file is read anew
     return str(digest(path)["sha256"])
 
 
@@ -78,7 +81,7 @@ def recorded(ds: Dataset, number: int) -> Recording:
             channels.append(Channel(name, unit, frame[name].to_numpy(), clock, text))
         if place == 0:
             channels.extend(_severities(labels, frame, clock))
-    meta = _meta(ds, resolved, number)
+    meta = _run_meta(ds, resolved, number)
     ends = ds.ends
     rows = [] if ends is None else ends.to_arrow(runs=[number]).to_pylist()
     final = last_values(rows[0]) if rows else {}
@@ -103,7 +106,7 @@ def _check_done(ds: Dataset, number: int) -> None:
         )
 
 
-def _meta(ds: Dataset, resolved: Resolved, number: int) -> dict[str, Any]:
+def _run_meta(ds: Dataset, resolved: Resolved, number: int) -> dict[str, Any]:
     run = resolved.run(number)
     row = ds.runs.to_arrow(runs=[number]).to_pylist()[0]
     return {
@@ -184,7 +187,7 @@ class Table:
         schema = self.dataset().schema
         if not self.is_old:
             return schema
-        return pa.schema([_present(item) for item in schema], metadata=schema.metadata)
+        return pa.schema([_present_name(item) for item in schema], metadata=schema.metadata)
 
     @property
     def columns(self) -> list[str]:
@@ -219,7 +222,7 @@ class Table:
         import pyarrow.dataset as ds
 
         numbers = None if runs is None else [int(number) for number in runs]
-        parts = self._of(numbers)
+        parts = self._parts_of(numbers)
         for part in parts:
             part.check()
         data = self.dataset(parts or self.parts[:1])
@@ -236,7 +239,7 @@ class Table:
         if not self.is_old:
             return table
         return pa.Table.from_arrays(
-            table.columns, schema=pa.schema([_present(item) for item in table.schema])
+            table.columns, schema=pa.schema([_present_name(item) for item in table.schema])
         )
 
     def _stored(self, names: Iterable[str]) -> dict[str, str]:
@@ -287,7 +290,7 @@ class Table:
                 whole[name].attrs["units"] = unit
         return whole
 
-    def _of(self, runs: Sequence[int] | None) -> Sequence[Part]:
+    def _parts_of(self, runs: Sequence[int] | None) -> Sequence[Part]:
         """Return the files that hold some runs."""
         if runs is None:
             return self.parts
@@ -411,7 +414,7 @@ class Dataset:
         return Table(str(self.folder / place / "*.parquet"), parts, clock, self.manifest.is_old)
 
 
-def _present(item: pa.Field) -> pa.Field:
+def _present_name(item: pa.Field) -> pa.Field:
     """Return a column of an old file with the present name and text."""
     about = item.metadata or {}
     text = {b"text": current(about[b"text"].decode()).encode()} if b"text" in about else {}

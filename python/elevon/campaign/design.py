@@ -74,7 +74,7 @@ def power_rows(
     freedom = len(coded) - rank
     inverse = np.linalg.pinv(matrix.T @ matrix)
     places = {name: len(head) + k for k, name in enumerate(columns)}
-    return [_row(request, term, places[term], matrix, inverse, freedom) for term in terms]
+    return [_power_row(request, term, places[term], matrix, inverse, freedom) for term in terms]
 
 
 def _interaction(term: str, coded: Floats, names: Sequence[str], place: str) -> Floats:
@@ -86,7 +86,7 @@ def _interaction(term: str, coded: Floats, names: Sequence[str], place: str) -> 
     return product
 
 
-def _row(  # noqa: PLR0917 - one line of a table, all of it needed
+def _power_row(  # noqa: PLR0917 - one line of a table, all of it needed
     request: Power, term: str, column: int, matrix: Floats, inverse: Floats, freedom: int
 ) -> dict[str, Any]:
     from scipy.stats import nct, t
@@ -139,28 +139,30 @@ def design_points(design: Design, wiring: str, folder: Path | None, place: str) 
     InputError
         The design cannot be: the place is named.
     """
-    names = _names(design, place)
+    names = _factor_letters(design, place)
     _check_keys(design, place)
-    regular = _regular(design, names, place)
+    regular = _regular_fraction(design, names, place)
     if design.kind == "table":
-        return _ordered(design, _of_table(design, wiring, names, folder, place), wiring, place)
-    coded = _coded(design, regular, place)
+        return _order_runs(
+            design, _read_point_table(design, wiring, names, folder, place), wiring, place
+        )
+    coded = _coded_points(design, regular, place)
     if not len(coded):
         raise InputError(f"{place}: the design is empty: it holds no point")
-    points = _spread_out(design, coded, regular, place)
+    points = _replicate_in_blocks(design, coded, regular, place)
     draw, block, replicate, whole = points
     columns = [
         _factor_values(design, factor, whole[:, k], wiring, f"{place}.factor[{k}]")
         for k, factor in enumerate(design.factor)
     ]
     result = Points(list(design.factor), columns, draw, block, replicate)
-    result.about = _about(design, regular, names, place)
+    result.about = _describe_design(design, regular, names, place)
     if design.power is not None:
         result.about["power"] = power_rows(design.power, whole, block, names, f"{place}.power")
-    return _ordered(design, result, wiring, place)
+    return _order_runs(design, result, wiring, place)
 
 
-def _names(design: Design, place: str) -> list[str]:
+def _factor_letters(design: Design, place: str) -> list[str]:
     usual = letters(len(design.factor))
     if len(usual) < len(design.factor):
         raise InputError(f"{place}: {len(design.factor)} factors are more than {len(usual)}")
@@ -195,7 +197,7 @@ def _check_keys(design: Design, place: str) -> None:
             raise InputError(f"{place}.factor[{k}]: a factor has no 'probability'")
 
 
-def _regular(design: Design, names: list[str], place: str) -> Fraction | None:
+def _regular_fraction(design: Design, names: list[str], place: str) -> Fraction | None:
     """Return the regular two-level design that this one is, None where it is none."""
     two = all(f.values is None or len(f.values) == 2 for f in design.factor)
     if design.kind == "fractional_factorial":
@@ -205,7 +207,7 @@ def _regular(design: Design, names: list[str], place: str) -> Fraction | None:
     return full(names) if design.kind == "full_factorial" and two else None
 
 
-def _coded(design: Design, regular: Fraction | None, place: str) -> Floats:
+def _coded_points(design: Design, regular: Fraction | None, place: str) -> Floats:
     """Return the points, -1 to +1; of a full factorial of several levels their numbers."""
     factors = len(design.factor)
     if regular is not None:
@@ -229,7 +231,7 @@ def _coded(design: Design, regular: Fraction | None, place: str) -> Floats:
 _MOST_POINTS = 1_000_000
 
 
-def _spread_out(
+def _replicate_in_blocks(
     design: Design, coded: Floats, regular: Fraction | None, place: str
 ) -> tuple[Ints, Ints, Ints, Floats]:
     """Add centre points and replicates, and deal the runs to the blocks."""
@@ -272,7 +274,7 @@ def _factor_values(
     return unit, levels[chosen]
 
 
-def _of_table(
+def _read_point_table(
     design: Design, wiring: str, names: list[str], folder: Path | None, place: str
 ) -> Points:
     """Read a table of the caller: a title for each factor (letter or name), a row a point."""
@@ -309,7 +311,7 @@ def _of_table(
         np.tile(np.arange(points), copies),
         replicate * design.blocks // copies,
         replicate,
-        {"kind": "table", "points": points, "factors": _listed(design, names)},
+        {"kind": "table", "points": points, "factors": _factor_rows(design, names)},
     )
 
 
@@ -332,19 +334,19 @@ def _cell(row: Sequence[str], index: int, path: Path, place: str) -> Any:
         return text
 
 
-def _listed(design: Design, names: Sequence[str]) -> list[dict[str, str]]:
+def _factor_rows(design: Design, names: Sequence[str]) -> list[dict[str, str]]:
     return [
         {"letter": name, "name": factor.name, "role": factor.role}
         for name, factor in zip(names, design.factor, strict=True)
     ]
 
 
-def _about(
+def _describe_design(
     design: Design, regular: Fraction | None, names: list[str], place: str
 ) -> dict[str, Any]:
     about: dict[str, Any] = {
         "kind": design.kind,
-        "factors": _listed(design, names),
+        "factors": _factor_rows(design, names),
         "replicates": design.replicates,
         "blocks": design.blocks,
         "centre": design.centre,
@@ -369,7 +371,7 @@ def _about(
     return about
 
 
-def _ordered(design: Design, points: Points, wiring: str, place: str) -> Points:
+def _order_runs(design: Design, points: Points, wiring: str, place: str) -> Points:
     """Put the runs in order: block by block, within them as designed or at random."""
     count = len(points.draw)
     generator = np.random.default_rng(design.order_seed)

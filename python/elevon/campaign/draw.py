@@ -99,14 +99,14 @@ def random_values(plan: Random, repeats: int, wiring: str, place: str) -> list[t
     columns = []
     for index, draw in enumerate(plan.draw):
         at = f"{place}.draw[{index}]"
-        unit, values = _drawn(draw, points[:, 2 * index], wiring, at)
+        unit, values = _unit_cube_points(draw, points[:, 2 * index], wiring, at)
         if draw.probability < 1.0:
             values = np.where(points[:, 2 * index + 1] < draw.probability, values, 0.0)
         columns.append((unit, values))
     return columns
 
 
-def _drawn(draw: Draw, fractions: Floats, wiring: str, place: str) -> tuple[str, Values]:
+def _unit_cube_points(draw: Draw, fractions: Floats, wiring: str, place: str) -> tuple[str, Values]:
     if draw.values is None:
         return ranged(draw, fractions, wiring, place)
     unit, levels = read_values(draw, list(draw.values), wiring, place)
@@ -145,8 +145,8 @@ def ranged(
     target: Ranged, fractions: Sequence[float] | Floats, wiring: str, place: str
 ) -> tuple[str, Values]:
     """Return unit and SI values at fractions (0 to 1) of a target's range, shape (n,)."""
-    low, written = _split(target.start, place)
-    high, other = _split(target.stop, place)
+    low, written = _number_and_unit(target.start, place)
+    high, other = _number_and_unit(target.stop, place)
     if written != other:
         raise InputError(
             f"{place}: 'from' is in {written or 'no unit'!r} and 'to' in {other or 'no unit'!r}; "
@@ -161,7 +161,7 @@ def ranged(
     else:
         numbers = low + u * (high - low)
     numbers = np.where(u == 0.0, low, np.where(u == 1.0, high, numbers))
-    unit = _unit(target, wiring, place)
+    unit = _unit_of_target(target, wiring, place)
     if unit is None:
         unit = si_unit(written) if written else ""
     if written:
@@ -180,18 +180,18 @@ def read_values(
         A name, a unit or a value that cannot be; the index is in the message.
     """
     if target.scenario is not None:
-        return _of_scenario(given, place)
+        return _read_scenario_values(given, place)
     if target.parameter is not None:
         record = record_of(wiring, target.parameter, place)
         read = [record.read(v, f"{place}: {target.parameter}") for v in given]
         unit = "" if record.choices is not None else record.unit
         return unit, np.array(read, dtype=object if record.choices is not None else np.float64)
-    unit = _unit(target, wiring, place) or ""
+    unit = _unit_of_target(target, wiring, place) or ""
     at = f"{place}: {target.fault}"
     return unit, np.array([parse_quantity(v, unit or "1", at) for v in given], dtype=np.float64)
 
 
-def _unit(target: Target, wiring: str, place: str) -> str | None:
+def _unit_of_target(target: Target, wiring: str, place: str) -> str | None:
     """Return the SI unit of a target; None where only the values decide it."""
     if target.parameter is not None:
         record = record_of(wiring, target.parameter, place)
@@ -207,9 +207,9 @@ def _unit(target: Target, wiring: str, place: str) -> str | None:
     return None
 
 
-def _of_scenario(given: Sequence[Any], place: str) -> tuple[str, Values]:
+def _read_scenario_values(given: Sequence[Any], place: str) -> tuple[str, Values]:
     """Read values of a place of the scenario: numbers where all of them are."""
-    read = [_number(value, place) for value in given]
+    read = [_quantity_or_none(value, place) for value in given]
     if all(item is not None for item in read):
         units = {unit for _, unit in filter(None, read) if unit}
         if len(units) < 2:
@@ -220,7 +220,7 @@ def _of_scenario(given: Sequence[Any], place: str) -> tuple[str, Values]:
     return "", values
 
 
-def _number(value: Any, place: str) -> tuple[float, str] | None:
+def _quantity_or_none(value: Any, place: str) -> tuple[float, str] | None:
     """Return a value in SI and its unit, None where it is no quantity."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value), ""
@@ -235,7 +235,7 @@ def _number(value: Any, place: str) -> tuple[float, str] | None:
     return parse_quantity(value, unit or "1", place), unit
 
 
-def _split(given: Any, place: str) -> tuple[float, str]:
+def _number_and_unit(given: Any, place: str) -> tuple[float, str]:
     if isinstance(given, str):
         parts = split_quantity(given)
         if parts is None:

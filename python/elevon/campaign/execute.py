@@ -26,7 +26,7 @@ Report = Callable[[float], Any]
 
 @dataclass(frozen=True)
 class CampaignResult:
-    """What a campaign did.
+    """Result of running a campaign.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class CampaignResult:
 
     @property
     def bytes(self) -> int:
-        """Size of the data."""
+        """Bytes of the data."""
         return sum(f["bytes"] for b in self.manifest.blocks for f in b["files"].values())
 
 
@@ -114,7 +114,7 @@ def run_campaign(
     with locked(folder):
         sweep(folder)
         work = begin(folder, resolved, text, need)
-        return _carried_out(
+        return _simulate_missing(
             work, count, cluster=cluster, progress=progress, announce=announce, start=start
         )
 
@@ -133,16 +133,16 @@ def resume_campaign(
     """
     start = time.perf_counter()
     folder, count = Path(out).expanduser(), checked_threads(threads)
-    resolved = _read_or_repaired(folder, announce)
+    resolved = _read_or_repair(folder, announce)
     with locked(folder):
         sweep(folder)
         work = begin(folder, resolved, None, None)
-        return _carried_out(
+        return _simulate_missing(
             work, count, cluster=cluster, progress=progress, announce=announce, start=start
         )
 
 
-def _read_or_repaired(folder: Path, announce: Callable[[str], Any] | None) -> Resolved:
+def _read_or_repair(folder: Path, announce: Callable[[str], Any] | None) -> Resolved:
     """Return the resolved plan of a folder; damage that what is whole can prove is repaired."""
     from elevon.campaign.repair import repair
 
@@ -160,7 +160,7 @@ def _read_or_repaired(folder: Path, announce: Callable[[str], Any] | None) -> Re
     return read_resolved(folder)
 
 
-def _carried_out(
+def _simulate_missing(
     work: CampaignWork,
     threads: int,
     *,
@@ -178,7 +178,7 @@ def _carried_out(
         announce(str(Cost.of(work)))
     work.check_disk()
     if cluster is None:
-        _in_threads(work, threads, progress)
+        _simulate_in_threads(work, threads, progress)
     else:
         from elevon.campaign.cluster import in_cluster
 
@@ -187,21 +187,21 @@ def _carried_out(
     return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
 
 
-def _in_threads(work: CampaignWork, threads: int, progress: Report | None) -> None:
+def _simulate_in_threads(work: CampaignWork, threads: int, progress: Report | None) -> None:
     """Simulate block after block; a helper prepares the next and writes the last meanwhile."""
     if not work.missing:
         return
     writing: Future[Item] | None = None
     with ThreadPoolExecutor(1, "campaign") as helper:
-        ahead = helper.submit(_prepared, work, work.missing[0])
+        ahead = helper.submit(_prepare_block, work, work.missing[0])
         try:
             for block, following in zip(work.missing, [*work.missing[1:], None], strict=True):
                 prepared = ahead.result()
                 if following is not None:
-                    ahead = helper.submit(_prepared, work, following)
-                share = _share(progress, work, block)
+                    ahead = helper.submit(_prepare_block, work, following)
+                share = _block_progress(progress, work, block)
                 results = simulate_block(work.resolved, prepared, threads, share)
-                _noted(work, writing)
+                _log_block(work, writing)
                 writing = helper.submit(
                     finish_block,
                     work.resolved,
@@ -212,22 +212,24 @@ def _in_threads(work: CampaignWork, threads: int, progress: Report | None) -> No
                     results=results,
                 )
         finally:
-            _noted(work, writing)
+            _log_block(work, writing)
 
 
-def _prepared(work: CampaignWork, block: int) -> list[Any]:
+def _prepare_block(work: CampaignWork, block: int) -> list[Any]:
     return [work.resolved.prepared(number) for number in work.numbers(block)]
 
 
-def _noted(work: CampaignWork, writing: Future[Item] | None) -> None:
-    """Note a block that has been written."""
+def _log_block(work: CampaignWork, writing: Future[Item] | None) -> None:
+    """Add a block that has been written to the log."""
     if writing is not None:
         item = writing.result()
         check_there(work.folder)
         work.log.add(item)
 
 
-def _share(progress: Report | None, work: CampaignWork, block: int) -> Callable[[float], bool]:
+def _block_progress(
+    progress: Report | None, work: CampaignWork, block: int
+) -> Callable[[float], bool]:
     first, last, total = work.edges[block], work.edges[block + 1], work.edges[-1]
 
     def report(fraction: float) -> bool:

@@ -57,7 +57,7 @@ def difference(folder: Path, resolved: Resolved) -> str:
     except (OSError, ValueError):
         return "its resolved plan cannot be read"
     new = json.loads(resolved_text(resolved))
-    places = list(_places(old, new, ""))
+    places = list(_differing_places(old, new, ""))
     changed = [
         f"the points of {name} have changed"
         for name, mark in new["sources"].items()
@@ -69,16 +69,16 @@ def difference(folder: Path, resolved: Resolved) -> str:
     return "; ".join([*changed, *(f"{place} differs" for place in places)][:_MOST])
 
 
-def _places(old: Any, new: Any, place: str) -> Iterator[str]:
+def _differing_places(old: Any, new: Any, place: str) -> Iterator[str]:
     """Yield the places at which two JSON values differ."""
     if isinstance(old, Mapping) and isinstance(new, Mapping):
         for key in dict.fromkeys([*old, *new]):
             inner = f"{place}.{key}" if place else str(key)
-            yield from _places(old.get(key), new.get(key), inner)
+            yield from _differing_places(old.get(key), new.get(key), inner)
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for index, (first, second) in enumerate(zip(old, new, strict=True)):
             named = first.get("path", index) if isinstance(first, Mapping) else index
-            yield from _places(first, second, f"{place}[{named}]")
+            yield from _differing_places(first, second, f"{place}[{named}]")
     elif old != new:
         yield place
 
@@ -99,7 +99,7 @@ class CampaignWork:
 
     @property
     def edges(self) -> list[int]:
-        """Where the blocks begin, and the end."""
+        """First run of each block, and one past the last run."""
         return self.manifest.edges
 
     @property
@@ -169,8 +169,8 @@ def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None)
         if text is not None and PLAN in Item("tables", manifest.files, {}).damaged(folder):
             write_text(folder / PLAN, text, force=True)
             manifest.files[PLAN] = digest(folder / PLAN)
-        _keep_split(folder, resolved, manifest)
-        return _there(folder, resolved, manifest)
+        _split_as_in_folder(folder, resolved, manifest)
+        return _find_blocks(folder, resolved, manifest)
     if need is None or text is None:
         raise OutputError(f"{folder}: its {MANIFEST} has gone meanwhile")
     settle(folder, {})
@@ -185,25 +185,25 @@ def begin(folder: Path, resolved: Resolved, text: str | None, need: Cost | None)
     return CampaignWork(folder, resolved, manifest, log, list(range(len(need.edges) - 1)))
 
 
-def _keep_split(folder: Path, resolved: Resolved, manifest: Manifest) -> None:
-    """Deal the runs as the folder does: its parts are no part of the plan's hash."""
+def _split_as_in_folder(folder: Path, resolved: Resolved, manifest: Manifest) -> None:
+    """Deal the runs to the parts that the folder has: the plan's hash does not hold them."""
     if resolved.split and resolved.split != manifest.split:
         warnings.warn(
-            f"{folder}: keeps the parts of its runs ({_parts(manifest.split)}), not those of the "
-            f"plan ({_parts(resolved.split)}); elevon dataset split deals them anew",
+            f"{folder}: keeps the parts of its runs ({_shares_text(manifest.split)}), not those of "
+            f"the plan ({_shares_text(resolved.split)}); elevon dataset split deals them anew",
             ElevonWarning,
             stacklevel=4,
         )
     split_index(resolved, manifest.split)
 
 
-def _parts(split: Mapping[str, Any]) -> str:
+def _shares_text(split: Mapping[str, Any]) -> str:
     shares = split.get("shares", {})
     return ", ".join(f"{name} = {share:g}" for name, share in shares.items()) or "none"
 
 
 def finished(work: CampaignWork) -> dict[str, list[object]] | None:
-    """Return how every run ended where the campaign is finished; a log left beside it goes."""
+    """Return how every run ended, None of an unfinished campaign; remove a log that is left."""
     files = Item("tables", work.manifest.files, {})
     if work.manifest.status == "running" or work.missing or not files.intact(work.folder):
         return None
@@ -277,7 +277,7 @@ def _plan_text(folder: Path) -> str:
     return read_regular(folder / PLAN, _LONGEST).decode("utf-8")
 
 
-def _there(folder: Path, resolved: Resolved, manifest: Manifest) -> CampaignWork:
+def _find_blocks(folder: Path, resolved: Resolved, manifest: Manifest) -> CampaignWork:
     """Find which blocks of a campaign are there, each file as it was written."""
     items, recovered = whole_blocks(folder, manifest)
     missing = [b for b in range(len(manifest.edges) - 1) if block_name(b) not in items]
@@ -296,20 +296,22 @@ def whole_blocks(folder: Path, manifest: Manifest) -> tuple[dict[str, Item], lis
     except FormatError:
         log = None  # each block says itself what it is
     before = {} if log is None else log.items
-    earlier = _finished(folder, manifest)
+    earlier = _finished_blocks(folder, manifest)
     items, recovered = {}, []
     for block, (first, stop) in enumerate(itertools.pairwise(manifest.edges)):
         name = block_name(block)
         item = before.get(name) or earlier.get(name)
         if item is None or not item.intact(folder):
-            item = _self_proved(folder, manifest, name, (first, stop - 1))
+            item = _proved_by_itself(folder, manifest, name, (first, stop - 1))
             recovered += [] if item is None else [name]
         if item is not None:
             items[name] = item
     return items, recovered
 
 
-def _self_proved(folder: Path, manifest: Manifest, name: str, span: tuple[int, int]) -> Item | None:
+def _proved_by_itself(
+    folder: Path, manifest: Manifest, name: str, span: tuple[int, int]
+) -> Item | None:
     """Return a block that the log does not know, where its own description proves it."""
     about = read_description(folder / ENDS / f"{name}.parquet")
     mine = (manifest.plan_hash, manifest.version, manifest.core, name, *span)
@@ -319,7 +321,7 @@ def _self_proved(folder: Path, manifest: Manifest, name: str, span: tuple[int, i
     return described_item(folder, about)
 
 
-def _finished(folder: Path, manifest: Manifest) -> dict[str, Item]:
+def _finished_blocks(folder: Path, manifest: Manifest) -> dict[str, Item]:
     """Return the items of a finished manifest, with how their runs ended."""
     if not manifest.blocks:
         return {}
@@ -400,7 +402,7 @@ def new_manifest(resolved: Resolved, need: Cost) -> Manifest:
         actuator=resolved.actuator.name,
         wiring=resolved.wiring,
         fidelity=resolved.fidelity,
-        clocks=[_clock(resolved, clock) for clock in clocks.values()],
+        clocks=[_clock_columns(resolved, clock) for clock in clocks.values()],
         faults=[{"name": n, "unit": u} for n, u in resolved.fault_names().items()],
         columns=[
             {"name": c.name, "kind": c.kind, "unit": c.unit, "role": c.role}
@@ -415,7 +417,7 @@ def new_manifest(resolved: Resolved, need: Cost) -> Manifest:
     )
 
 
-def _clock(resolved: Resolved, clock: ClockPlan) -> dict[str, Any]:
+def _clock_columns(resolved: Resolved, clock: ClockPlan) -> dict[str, Any]:
     unit = resolved.prepared(0).command_unit
     columns = [
         {
@@ -436,7 +438,7 @@ def _clock(resolved: Resolved, clock: ClockPlan) -> dict[str, Any]:
 def resplit(
     folder: Path, shares: Mapping[str, float], *, by: str | None = None, seed: int = 0
 ) -> dict[str, int]:
-    """Deal whole units, or whole draws, to parts; the samples stay as they are.
+    """Deal whole units, or whole draws, to other parts; the samples are not changed.
 
     Parameters
     ----------
@@ -460,7 +462,7 @@ def resplit(
         Shares that do not add up, a part that would be empty, a split that would leak, or a
         campaign that is not finished.
     """
-    _check(shares)
+    _check_shares(shares)
     with locked(folder):
         sweep(folder)
         manifest = read_manifest(folder)
@@ -471,7 +473,7 @@ def resplit(
         resolved = read_resolved(folder, manifest)
         population = bool((resolved.index.unit >= 0).all())
         noun = by or ("unit" if population else "draw")
-        _check_noun(noun, population=population)
+        _check_grouping(noun, population=population)
         split_index(resolved, {"shares": dict(shares), "by": noun, "seed": seed}, "--share")
         plan = read_regular(folder / PLAN, LONGEST).decode("utf-8")
         change = Transaction(folder)
@@ -481,13 +483,13 @@ def resplit(
     return {name: int((resolved.index.split == name).sum()) for name in shares}
 
 
-def _check(shares: Mapping[str, float]) -> None:
+def _check_shares(shares: Mapping[str, float]) -> None:
     values = list(shares.values())
     if not values or min(values) < 0.0 or abs(sum(values) - 1.0) > 1e-9:
         raise InputError(f"--share: the shares are {values}; they must add up to 1")
 
 
-def _check_noun(noun: str, *, population: bool) -> None:
+def _check_grouping(noun: str, *, population: bool) -> None:
     if noun not in {"unit", "draw"}:
         raise InputError(
             f"--by {noun} would leak: runs alike stand in two parts; valid: unit, draw"

@@ -69,7 +69,7 @@ def repair(folder: Path) -> list[str]:
 
 @dataclass
 class _Survey:
-    """What a folder still holds, each part None where it is damaged or has gone."""
+    """Contents of a damaged folder; a part that is damaged or missing is None."""
 
     folder: Path
     manifest: Manifest | None
@@ -81,7 +81,7 @@ class _Survey:
 
     @property
     def mark(self) -> str:
-        """The plan's hash, by whoever still knows it."""
+        """Hash of the plan, from the manifest, else from the copy or the blocks."""
         if self.manifest is not None:
             return self.manifest.plan_hash
         marks = {about["plan_hash"] for about in self.blocks.values()}
@@ -97,13 +97,13 @@ class _Survey:
 
 def repair_locked(folder: Path) -> list[str]:
     """Repair a folder that this process holds; see `repair`."""
-    survey = _surveyed(folder)
+    survey = _survey(folder)
     if survey.manifest is not None:
         survey.manifest.check_writable(folder)
         moved = settle(folder, survey.manifest.files)
         survey.done += [f"{name}: a change that was cut short is complete" for name in moved]
         if moved:
-            survey = _surveyed(folder, survey.done)
+            survey = _survey(folder, survey.done)
     resolved = _resolved(survey)
     manifest = survey.manifest or _manifest(survey, resolved)
     split_index(resolved, manifest.split)
@@ -113,12 +113,15 @@ def repair_locked(folder: Path) -> list[str]:
     missing = [block for block, name in enumerate(names) if name not in items]
     log = WorkLog(folder / LOG, manifest.plan_hash, items)
     work = CampaignWork(folder, resolved, manifest, log, missing, recovered)
-    _write(survey, work)
-    return [*survey.done, *(_lost(folder, names[block]) for block in missing if manifest.blocks)]
+    _write_damaged(survey, work)
+    return [
+        *survey.done,
+        *(_lost_block_text(folder, names[block]) for block in missing if manifest.blocks),
+    ]
 
 
-def _surveyed(folder: Path, done: list[str] | None = None) -> _Survey:
-    """Read everything that can be read; nothing is believed yet."""
+def _survey(folder: Path, done: list[str] | None = None) -> _Survey:
+    """Read everything that can be read, without checking one against the other."""
     manifest = None
     try:
         manifest = read_manifest(folder)
@@ -140,7 +143,7 @@ def _surveyed(folder: Path, done: list[str] | None = None) -> _Survey:
 
 def _resolved(survey: _Survey) -> Resolved:
     """Return the resolved plan that the plan's hash stands for."""
-    for resolved in _candidates(survey):
+    for resolved in _plan_candidates(survey):
         if plan_hash(resolved) == survey.mark:
             return resolved
     raise FormatError(
@@ -150,7 +153,7 @@ def _resolved(survey: _Survey) -> Resolved:
     )
 
 
-def _candidates(survey: _Survey) -> Iterator[Resolved]:
+def _plan_candidates(survey: _Survey) -> Iterator[Resolved]:
     """Yield what may be the resolved plan: its file, its copy, and the plan resolved anew."""
     for content in survey.contents if survey.table is not None else []:
         try:
@@ -162,12 +165,12 @@ def _candidates(survey: _Survey) -> Iterator[Resolved]:
         texts.append(read_regular(survey.folder / PLAN, LONGEST).decode("utf-8"))
     for text in texts:
         try:
-            yield _resolved_anew(survey.folder, text)
+            yield _resolve_again(survey.folder, text)
         except (ElevonError, ValueError):
             continue
 
 
-def _resolved_anew(folder: Path, text: str) -> Resolved:
+def _resolve_again(folder: Path, text: str) -> Resolved:
     from elevon.campaign.grammar import checked_plan
     from elevon.campaign.resolve import resolve_plan
     from elevon.documents import Document
@@ -177,7 +180,7 @@ def _resolved_anew(folder: Path, text: str) -> Resolved:
 
 
 def _manifest(survey: _Survey, resolved: Resolved) -> Manifest:
-    """Return the manifest that a folder must have had."""
+    """Return the manifest of a folder, made again from its plan and blocks."""
     checked = check(resolved)
     edges = borders(checked.sizes, resolved.runs_per_file)
     spans = sorted((about["first"], about["last"] + 1) for about in survey.blocks.values())
@@ -199,7 +202,7 @@ def _manifest(survey: _Survey, resolved: Resolved) -> Manifest:
     return manifest
 
 
-def _write(survey: _Survey, work: CampaignWork) -> None:
+def _write_damaged(survey: _Survey, work: CampaignWork) -> None:
     """Write what is damaged; all that changes together, by one switch."""
     folder, manifest = work.folder, work.manifest
     damaged = Item("tables", manifest.files, {}).damaged(folder)
@@ -239,7 +242,7 @@ def _plan_text(survey: _Survey, work: CampaignWork, damaged: list[str]) -> str:
     if survey.copy is not None:
         return str(survey.copy["plan"])
     text = read_regular(work.folder / PLAN, LONGEST).decode("utf-8")
-    if plan_hash(_resolved_anew(work.folder, text)) != survey.mark:
+    if plan_hash(_resolve_again(work.folder, text)) != survey.mark:
         raise FormatError(f"{work.folder}: cannot be repaired: {PLAN} is not as it was written")
     return text
 
@@ -265,5 +268,5 @@ def _log_differs(work: CampaignWork) -> bool:
     return log is None or log.cut or log.items.keys() != work.log.items.keys()
 
 
-def _lost(folder: Path, name: str) -> str:
+def _lost_block_text(folder: Path, name: str) -> str:
     return f"{name}: is damaged or has gone; elevon campaign resume {folder} simulates it again"

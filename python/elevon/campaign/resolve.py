@@ -44,7 +44,7 @@ def check_counts(plan: Plan, place: str) -> int:
     """
     if len(plan.vary) > _MOST_AXES:
         raise InputError(f"{place}: {len(plan.vary)} axes in 'vary'; the limit is {_MOST_AXES}")
-    counts = dict(_counts(plan))
+    counts = dict(_axis_lengths(plan))
     total = math.prod(counts.values())
     if total > MOST_RUNS:
         listed = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)
@@ -52,7 +52,7 @@ def check_counts(plan: Plan, place: str) -> int:
     return total
 
 
-def _counts(plan: Plan) -> dict[str, int]:
+def _axis_lengths(plan: Plan) -> dict[str, int]:
     counts = {"seeds": max(len(plan.seeds), 1), "cases": max(len(plan.case or ()), 1)}
     if plan.population is not None:
         counts["units"] = plan.population.units
@@ -62,11 +62,11 @@ def _counts(plan: Plan) -> dict[str, int]:
     if plan.random is not None:
         counts["random draws"] = max(plan.random.count, 1)
     if plan.design is not None:
-        counts["points of the design"] = _points(plan.design)
+        counts["points of the design"] = _design_points_bound(plan.design)
     return counts
 
 
-def _points(design: Any) -> int:
+def _design_points_bound(design: Any) -> int:
     """Return an upper bound of a design's points, replicates and centre points among them."""
     if design.kind in _ALL_LEVELS:
         points = math.prod(_levels(factor) for factor in design.factor)
@@ -116,12 +116,12 @@ def units_of(population: Population, actuator: Actuator, place: str) -> Units:
     columns: list[tuple[str, Any]] = []
     for k, spread in enumerate(population.spread):
         generator = np.random.default_rng(seeds[k])
-        unit_text, values = _spread(spread, actuator, count, generator, f"{place}.spread[{k}]")
+        unit_text, values = _unit_values(spread, actuator, count, generator, f"{place}.spread[{k}]")
         columns.append((unit_text, values[unit]))
     for k, growth in enumerate(population.growth):
         generator = np.random.default_rng(seeds[len(population.spread) + k])
         columns.append(
-            _grown(growth, actuator.wiring, (unit, age), generator, f"{place}.growth[{k}]")
+            _growth_values(growth, actuator.wiring, (unit, age), generator, f"{place}.growth[{k}]")
         )
     return Units(targets, columns, unit, age)
 
@@ -133,7 +133,7 @@ def _ages(population: Population) -> Floats:
     return np.linspace(0.0, 1.0, points) if points > 1 else np.zeros(1)
 
 
-def _spread(
+def _unit_values(
     spread: Spread, actuator: Actuator, count: int, generator: np.random.Generator, place: str
 ) -> tuple[str, Floats]:
     """Return the values of one parameter of all units."""
@@ -145,7 +145,7 @@ def _spread(
         return ranged(spread, generator.random(count), actuator.wiring, place)
     nominal = actuator.parameters.value(path)
     sd, relative = _deviation(spread, record.unit, place)
-    normal = _cut_normal(generator.random(count), float(spread.cut))
+    normal = _truncated_normal(generator.random(count), float(spread.cut))
     if spread.distribution == "lognormal":
         if not relative:
             raise InputError(f"{place}: the 'sd' of a lognormal spread is a fraction: '3 %'")
@@ -165,7 +165,7 @@ def _deviation(spread: Spread, unit: str, place: str) -> tuple[float, bool]:
     return sd, relative
 
 
-def _cut_normal(uniform: Floats, cut: float) -> Floats:
+def _truncated_normal(uniform: Floats, cut: float) -> Floats:
     """Return standard normal values cut at so many standard deviations, from uniform ones."""
     from scipy.special import ndtr, ndtri
 
@@ -174,7 +174,7 @@ def _cut_normal(uniform: Floats, cut: float) -> Floats:
     return values
 
 
-def _grown(
+def _growth_values(
     growth: Growth,
     wiring: str,
     where: tuple[npt.NDArray[np.int64], Floats],
@@ -186,7 +186,7 @@ def _grown(
     text, ends = ranged(growth, np.array([0.0, 1.0]), wiring, place)
     count = int(unit.max()) + 1
     onset = growth.onset[0] + (growth.onset[1] - growth.onset[0]) * generator.random(count)
-    factor = np.exp(growth.spread * _cut_normal(generator.random(count), 3.0))
+    factor = np.exp(growth.spread * _truncated_normal(generator.random(count), 3.0))
     grows = generator.random(count) < growth.probability
     fraction = np.clip((age - onset[unit]) / (1.0 - onset[unit]), 0.0, 1.0)
     size = np.where(grows, (ends[1] - ends[0]) * factor, 0.0)
@@ -256,15 +256,15 @@ def resolve_plan(plan: Plan, document: Document, *, allow_outside: bool = False)
     if 0 in lengths:
         raise InputError(f"{document.place()}: the plan is empty: it holds no run")
     places = [axis.reshape(-1) for axis in np.indices(lengths, dtype=np.int64)]
-    quantities = list(_quantities(plan, parts, places, lengths))
-    _no_twins([target for target, _, _ in quantities], base, document)
+    quantities = list(_varied_quantities(plan, parts, places, lengths))
+    _check_varied_once([target for target, _, _ in quantities], base, document)
     resolved = Resolved(
         name=plan.name,
         text=plan.text,
         actuator=actuator,
         fidelity=plan.fidelity,
-        record=plan.record if plan.record is None else _texts(plan.record),
-        features=_texts(plan.features),
+        record=plan.record if plan.record is None else _record_texts(plan.record),
+        features=_record_texts(plan.features),
         scenario=base,
         variants=parts.variants,
         columns=[files.column(column_of(*item), document.place()) for item in quantities],
@@ -277,7 +277,7 @@ def resolve_plan(plan: Plan, document: Document, *, allow_outside: bool = False)
         design={} if parts.points is None else parts.points.about,
     )
     if plan.split:
-        split_index(resolved, _dealing(plan), document.place(("split",)))
+        split_index(resolved, _split_rule(plan), document.place(("split",)))
     return resolved
 
 
@@ -304,7 +304,7 @@ def _parts(plan: Plan, actuator: Actuator, document: Document, files: Embedder) 
     return _Parts(units, _variants(plan, document, files), axes, draws, points)
 
 
-def _quantities(
+def _varied_quantities(
     plan: Plan, parts: _Parts, places: Sequence[Any], lengths: Sequence[int]
 ) -> Iterator[Quantity]:
     """Yield every varied quantity with its unit and its value in each run."""
@@ -328,7 +328,7 @@ def _index(
     places: Sequence[Any],
     lengths: Sequence[int],
 ) -> Index:
-    """Return what each run is: unit, age, case, draw, block, replicate, seed, part of the data."""
+    """Return the index of the runs: unit, age, case, draw, block, replicate, seed, part."""
     ages, drawn, count = places[0], places[-2], len(places[0])
     units, points = parts.units, parts.points
     none = np.zeros(count, dtype=np.int64)
@@ -337,7 +337,7 @@ def _index(
     elif plan.random is not None:
         draw = ages * lengths[-2] + drawn
     else:
-        draw = _distinct(places[:-1])
+        draw = _number_combinations(places[:-1])
     return Index(
         unit=none - 1 if units is None else units.unit[ages],
         age=np.full(count, np.nan) if units is None else units.age[ages],
@@ -350,7 +350,7 @@ def _index(
     )
 
 
-def _texts(record: str | Sequence[str]) -> list[str]:
+def _record_texts(record: str | Sequence[str]) -> list[str]:
     return [record] if isinstance(record, str) else list(record)
 
 
@@ -399,7 +399,7 @@ def _variants(plan: Plan, document: Document, files: Embedder) -> list[CaseChang
     return variants
 
 
-def _no_twins(targets: Sequence[Target], base: dict[str, Any], document: Document) -> None:
+def _check_varied_once(targets: Sequence[Target], base: dict[str, Any], document: Document) -> None:
     seen: set[str] = set()
     for target in targets:
         if target.name in seen:
@@ -412,7 +412,7 @@ def _no_twins(targets: Sequence[Target], base: dict[str, Any], document: Documen
         seen.add(target.name)
 
 
-def _dealing(plan: Plan) -> dict[str, Any]:
+def _split_rule(plan: Plan) -> dict[str, Any]:
     """Return how the plan deals its runs to parts."""
     if not plan.split:
         return {}
@@ -421,7 +421,7 @@ def _dealing(plan: Plan) -> dict[str, Any]:
     return {"shares": shares, "by": by, "seed": plan.split_seed}
 
 
-def _distinct(axes: Sequence[Any]) -> Any:
+def _number_combinations(axes: Sequence[Any]) -> Any:
     """Number the combinations of several axes."""
     number = np.zeros(len(axes[0]), dtype=np.int64)
     for axis in axes:

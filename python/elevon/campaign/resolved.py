@@ -84,7 +84,7 @@ class Embedder:
         return {
             key: [self.fault(item, f"{place}.fault[{k}]") for k, item in enumerate(value)]
             if key == "fault" and isinstance(value, (list, tuple))
-            else self._within(value, f"{place}.{key}")
+            else self._embed_files(value, f"{place}.{key}")
             for key, value in data.items()
         }
 
@@ -109,7 +109,7 @@ class Embedder:
 
             text = _FILE.sub(lambda m: m[1] + str(self.note(m[2].strip())), item)
             return Profile.parse(text).to_dict()
-        return self._within(item, place)
+        return self._embed_files(item, place)
 
     def column(self, column: Column, place: str) -> Column:
         """Read the files among the values of a column, and of its fault's profile."""
@@ -127,12 +127,12 @@ class Embedder:
             self.sources[str(path)] = hashlib.sha256(read_regular(path, LONGEST)).hexdigest()
         return path
 
-    def _within(self, value: Any, place: str) -> Any:
+    def _embed_files(self, value: Any, place: str) -> Any:
         if isinstance(value, (list, tuple)):
-            return [self._within(item, f"{place}[{k}]") for k, item in enumerate(value)]
+            return [self._embed_files(item, f"{place}[{k}]") for k, item in enumerate(value)]
         if not isinstance(value, Mapping):
             return value
-        inner = {key: self._within(item, f"{place}.{key}") for key, item in value.items()}
+        inner = {key: self._embed_files(item, f"{place}.{key}") for key, item in value.items()}
         if isinstance(name := inner.get("file"), str) and "times" not in inner:
             del inner["file"]
             inner.update(self.series(name, place))
@@ -243,7 +243,7 @@ class Resolved:
 
     def values(self, number: int) -> dict[str, object]:
         """Return the varied quantities of one run: SI numbers, 0 for a fault it is spared."""
-        return {c.name: _plain(c.values[number]) for c in self.columns}
+        return {c.name: _python_value(c.values[number]) for c in self.columns}
 
     def run(self, number: int) -> Run:
         """Return one run, as `elevon.simulate` takes it.
@@ -257,7 +257,7 @@ class Resolved:
         variant = self.variants[self.index.variant[number]]
         parameters = dict(variant.parameters)
         parameters.update(
-            (c.name, _plain(c.values[number])) for c in self.columns if c.kind == "parameter"
+            (c.name, _python_value(c.values[number])) for c in self.columns if c.kind == "parameter"
         )
         return Run(
             self.actuator.with_values(parameters, source="plan", place=place),
@@ -298,10 +298,12 @@ class Resolved:
         """Return what decides how a run is prepared, apart from numbers that are only put in."""
         key: list[Any] = [int(self.index.variant[number])]
         for column in self.columns:
-            value = _plain(column.values[number])
+            value = _python_value(column.values[number])
             if column.kind == "fault":
                 key.append(value != 0.0)
-            elif column.kind == "scenario" or not column.numeric or _prepares(column.name):
+            elif (
+                column.kind == "scenario" or not column.numeric or _changes_preparation(column.name)
+            ):
                 key.append(value if isinstance(value, (float, str)) else repr(value))
         return tuple(key)
 
@@ -345,14 +347,16 @@ class Resolved:
         data = copy.deepcopy({**self.scenario, **variant.scenario})
         for column in self.columns:
             if column.kind == "scenario":
-                set_place(data, column.name, copy.deepcopy(_plain(column.values[number])), place)
-        faults = [*data.get("fault", []), *variant.faults, *self._drawn(number)]
+                set_place(
+                    data, column.name, copy.deepcopy(_python_value(column.values[number])), place
+                )
+        faults = [*data.get("fault", []), *variant.faults, *self._faults_of_run(number)]
         dropped = self.not_carried() if self.allow_not_acting else {}
         data["fault"] = [f for f in faults if f"{f['kind']}@{f['place']}" not in dropped]
         whole: dict[str, Any] = filled(data, self.files)
         return whole if whole["fault"] else {k: v for k, v in whole.items() if k != "fault"}
 
-    def _drawn(self, number: int) -> Iterator[dict[str, Any]]:
+    def _faults_of_run(self, number: int) -> Iterator[dict[str, Any]]:
         for column in self.columns:
             if column.kind == "fault" and column.values[number] != 0.0:
                 kind, at = column.name.split("@")
@@ -365,7 +369,7 @@ class Resolved:
 _MOST_TEMPLATES = 512
 
 
-def _prepares(path: str) -> bool:
+def _changes_preparation(path: str) -> bool:
     """Whether a number decides more of a run's preparation than its own place in the vector."""
     return path.endswith((".step", ".pole_pairs")) or path.startswith("stop.")
 
@@ -376,7 +380,7 @@ def record_of_fault(name: str, wiring: str) -> FaultRecord:
     return find_record(kind, place, wiring)
 
 
-def _plain(value: Any) -> Any:
+def _python_value(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
@@ -392,14 +396,14 @@ def set_place(data: Any, path: str, value: object, place: str) -> None:
             f"{place}: scenario = {path!r} is not a place such as command.terms[0].phase"
         )
     for step, following in itertools.pairwise(steps):
-        data = _stepped(data, step, following, path, place)
+        data = _step_into(data, step, following, path, place)
     last = steps[-1]
     if isinstance(last, int) and (not isinstance(data, list) or last >= len(data)):
         raise InputError(f"{place}: the scenario has no {path!r} (no entry {last})")
     data[last] = value
 
 
-def _stepped(data: Any, step: Any, following: Any, path: str, place: str) -> Any:
+def _step_into(data: Any, step: Any, following: Any, path: str, place: str) -> Any:
     if isinstance(step, int):
         if not isinstance(data, list) or step >= len(data):
             raise InputError(f"{place}: the scenario has no {path!r} (no entry {step})")

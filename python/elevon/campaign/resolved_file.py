@@ -65,10 +65,10 @@ def resolved_text(resolved: Resolved) -> str:
 
 def plan_hash(resolved: Resolved) -> str:
     """Return the SHA-256 of everything that decides a campaign's results."""
-    return _hash(json.loads(resolved_text(resolved)), resolved)
+    return _hash_of(json.loads(resolved_text(resolved)), resolved)
 
 
-def _hash(content: Mapping[str, Any], resolved: Resolved) -> str:
+def _hash_of(content: Mapping[str, Any], resolved: Resolved) -> str:
     # Where a file stood, and what only readers read, decides nothing: its points do.
     reading = {"sources", "text", "responses", "runs_per_file", "split"}
     deciding = {key: value for key, value in content.items() if key not in reading}
@@ -77,11 +77,11 @@ def _hash(content: Mapping[str, Any], resolved: Resolved) -> str:
     if content["schema"] >= SPLIT_IS_NO_PART:
         del index["split"]
     for values in (*(column.values for column in resolved.columns), *index.values()):
-        mark.update(_bytes(values))
+        mark.update(_compressed_bytes(values))
     return mark.hexdigest()
 
 
-def _bytes(values: Any) -> bytes:
+def _compressed_bytes(values: Any) -> bytes:
     if values.dtype == object:
         return json.dumps(values.tolist()).encode()
     raw: bytes = np.ascontiguousarray(values).tobytes()
@@ -103,7 +103,7 @@ def read_resolved(folder: Path, manifest: Manifest | None = None) -> Resolved:
         path = located(folder, RESOLVED, manifest.files.get(RESOLVED))
         content = json.loads(read_regular(path, LONGEST))
         table = read_table(located(folder, RUNS, manifest.files.get(RUNS)))
-        resolved, mark = _checked(content, table)
+        resolved, mark = _check_values(content, table)
     except (OSError, ValueError, KeyError, TypeError, RecursionError, pa.ArrowException) as error:
         raise FormatError(
             f"{folder}: {RESOLVED} or {RUNS} is damaged ({error!r}){repair_hint(folder)}"
@@ -119,7 +119,7 @@ def read_resolved(folder: Path, manifest: Manifest | None = None) -> Resolved:
     return resolved
 
 
-def _checked(content: Mapping[str, Any], table: Any) -> tuple[Resolved, str]:
+def _check_values(content: Mapping[str, Any], table: Any) -> tuple[Resolved, str]:
     """Return the resolved plan and the hash of its content, of an old one before it is mapped."""
     if content["schema"] == SCHEMA:
         resolved = rebuilt(content, table)
@@ -128,7 +128,7 @@ def _checked(content: Mapping[str, Any], table: Any) -> tuple[Resolved, str]:
         raise InputError(f"its form is number {content['schema']!r}")
     present = table.rename_columns([current(name) for name in table.column_names])
     resolved = rebuilt(mapped(content), present)
-    return resolved, _hash(content, resolved)  # the values are the same under either name
+    return resolved, _hash_of(content, resolved)  # the values are the same under either name
 
 
 def rebuilt(content: Mapping[str, Any], table: Any) -> Resolved:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from elevon.campaign.resolved import Resolved
 
 
-def _below(name: str) -> str:
+def _check_below(name: str) -> str:
     """Refuse a file's name that leads out of the folder."""
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or "\0" in name or not path.parts:
@@ -47,7 +47,7 @@ class _File(BaseModel):
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
 
 
-_Name = Annotated[str, Field(max_length=200), AfterValidator(_below)]
+_Name = Annotated[str, Field(max_length=200), AfterValidator(_check_below)]
 _Files = dict[_Name, _File]
 
 
@@ -358,7 +358,7 @@ def described_item(folder: Path, about: Mapping[str, Any]) -> Item | None:
     files = {**about["files"], table_file: digest(folder / table_file)}
     item = Item(about["name"], files, {"first": about["first"], "last": about["last"]})
     try:
-        if not item.intact(folder) or not _readable(folder / table_file):
+        if not item.intact(folder) or not _is_readable(folder / table_file):
             return None
         ended = read_ends(folder, files)
     except (OSError, ValueError, pa.ArrowException):
@@ -366,7 +366,7 @@ def described_item(folder: Path, about: Mapping[str, Any]) -> Item | None:
     return None if ended is None else Item(item.name, files, {**item.data, **ended})
 
 
-def _readable(path: Path) -> bool:
+def _is_readable(path: Path) -> bool:
     import pyarrow as pa
     import pyarrow.parquet as pq
 

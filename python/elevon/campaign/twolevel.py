@@ -123,8 +123,8 @@ def fraction(
     if bool(written) == (runs is not None):
         raise InputError(f"{place}: give either 'generators' or 'runs'")
     if runs is not None:
-        return _searched(list(names), runs, place)
-    read = [_generator(text, list(names), place) for text in written]
+        return _search_generators(list(names), runs, place)
+    read = [_read_generator(text, list(names), place) for text in written]
     made = {factor for factor, _, _ in read}
     for text, (_, word, _) in zip(written, read, strict=True):
         if any(word >> factor & 1 for factor in made):
@@ -179,7 +179,7 @@ def plackett_burman(factors: int, runs: int, place: str) -> Coded:
             f"{place}: there is no Plackett-Burman design of {runs} runs for {factors} factors; "
             f"runs: {', '.join(map(str, near))}, ..."
         )
-    matrix = _sylvester(runs) if runs & (runs - 1) == 0 else _paley(runs)
+    matrix = _sylvester_matrix(runs) if runs & (runs - 1) == 0 else _paley_matrix(runs)
     return matrix[:, 1 : factors + 1].copy()
 
 
@@ -200,17 +200,21 @@ def block_words(design: Fraction, count: int, place: str, words: Iterable[str] =
             f"{place}: {count} blocks of {design.runs} points: give a power of two below "
             f"{design.runs}, or as many replicates"
         )
-    given = [_word(text, design.names, place) for text in words]
+    given = [_read_word(text, design.names, place) for text in words]
     if given and len(given) != bits:
         raise InputError(f"{place}: {count} blocks need {bits} block_generators, not {len(given)}")
     if given:
         chosen = given
     else:
-        known = sorted(range(1, 1 << len(design.names)), key=lambda w: (-_order(w, design), w))
+        known = sorted(
+            range(1, 1 << len(design.names)), key=lambda w: (-_lowest_effect_order(w, design), w)
+        )
         known = list(dict.fromkeys(min(w ^ d for d in (0, *design.words)) for w in known))[:40]
         sets = itertools.islice(itertools.combinations(known, bits), _MOST_TRIED)
-        chosen = list(max(sets, key=lambda s: min(_order(w, design) for w in _span(s))))
-    worst = min(_order(word, design) for word in _span(chosen))
+        chosen = list(
+            max(sets, key=lambda s: min(_lowest_effect_order(w, design) for w in _products(s)))
+        )
+    worst = min(_lowest_effect_order(word, design) for word in _products(chosen))
     if worst < 2:
         raise InputError(f"{place}: the blocks would be confounded with a factor")
     return chosen
@@ -224,7 +228,7 @@ def blocks_of(design: Coded, words: Sequence[int]) -> npt.NDArray[np.int64]:
     return number
 
 
-def _span(words: Iterable[int]) -> list[int]:
+def _products(words: Iterable[int]) -> list[int]:
     """Return all products of words; the identity alone where they are not independent."""
     group, count = {0}, 0
     for word in words:
@@ -233,12 +237,12 @@ def _span(words: Iterable[int]) -> list[int]:
     return [word for word in group if word] if len(group) == 1 << count else [0]
 
 
-def _order(word: int, design: Fraction) -> int:
-    """Return of how many factors the lowest effect is that a word cannot be told from."""
+def _lowest_effect_order(word: int, design: Fraction) -> int:
+    """Return the order of the lowest effect that a word is aliased with."""
     return min((word ^ other).bit_count() for other in (0, *design.words))
 
 
-def _generator(text: str, names: list[str], place: str) -> tuple[int, int, int]:
+def _read_generator(text: str, names: list[str], place: str) -> tuple[int, int, int]:
     left, equals, right = text.replace(" ", "").partition("=")
     sign = -1 if right.startswith("-") else 1
     right = right.lstrip("+-")
@@ -246,13 +250,13 @@ def _generator(text: str, names: list[str], place: str) -> tuple[int, int, int]:
         raise InputError(
             f"{place}: generator {text!r} is not of the form E=ABCD; factors: {', '.join(names)}"
         )
-    word = _word(right, names, place)
+    word = _read_word(right, names, place)
     if word >> names.index(left) & 1:
         raise InputError(f"{place}: generator {text!r} has its own factor on both sides")
     return names.index(left), word, sign
 
 
-def _word(text: str, names: Sequence[str], place: str) -> int:
+def _read_word(text: str, names: Sequence[str], place: str) -> int:
     parts = text.split(":") if ":" in text or not all(len(n) == 1 for n in names) else list(text)
     for part in parts:
         if part not in names:
@@ -262,7 +266,7 @@ def _word(text: str, names: Sequence[str], place: str) -> int:
     return sum(1 << names.index(part) for part in parts)
 
 
-def _searched(names: list[str], runs: int, place: str) -> Fraction:
+def _search_generators(names: list[str], runs: int, place: str) -> Fraction:
     """Find generators of the highest resolution, then of the fewest words of each length."""
     base = runs.bit_length() - 1
     extra = len(names) - base
@@ -277,12 +281,12 @@ def _searched(names: list[str], runs: int, place: str) -> Fraction:
     )
     while len(words) > extra and math.comb(len(words), extra) > _MOST_TRIED:
         words.pop()
-    best = min(itertools.combinations(words, extra), key=lambda chosen: _pattern(chosen, base))
+    best = min(itertools.combinations(words, extra), key=lambda chosen: _word_lengths(chosen, base))
     generators = [(base + k, word, 1) for k, word in enumerate(sorted(best))]
     return Fraction(names, generators)
 
 
-def _pattern(chosen: Sequence[int], base: int) -> tuple[int, ...]:
+def _word_lengths(chosen: Sequence[int], base: int) -> tuple[int, ...]:
     """Return how many words of each length a choice of generators has, short ones first."""
     group = [0]
     for place, word in enumerate(chosen):
@@ -301,14 +305,14 @@ def _constructible(runs: int) -> bool:
     return runs & (runs - 1) == 0 or prime
 
 
-def _sylvester(runs: int) -> Coded:
+def _sylvester_matrix(runs: int) -> Coded:
     matrix = np.ones((1, 1))
     while len(matrix) < runs:
         matrix = np.block([[matrix, matrix], [matrix, -matrix]])
     return matrix
 
 
-def _paley(runs: int) -> Coded:
+def _paley_matrix(runs: int) -> Coded:
     """Return the Hadamard matrix of quadratic residues modulo the prime runs - 1 (3 modulo 4)."""
     prime = runs - 1
     residues = {k * k % prime for k in range(1, prime)}

@@ -44,33 +44,35 @@ def verify(
     try:
         ds = load_campaign(root)
     except FormatError as error:
-        return [_count(f"damage to the manifest ({error})", 1)]
-    return [_count("damage to the manifest", 0), *_of(ds, progress)]
+        return [_count_check(f"damage to the manifest ({error})", 1)]
+    return [_count_check("damage to the manifest", 0), *_checks(ds, progress)]
 
 
-def _of(ds: Dataset, progress: Callable[[float], Any] | None) -> Iterator[Check]:
+def _checks(ds: Dataset, progress: Callable[[float], Any] | None) -> Iterator[Check]:
     items = ds.items
     done = sum(item.data["last"] - item.data["first"] + 1 for item in items)
-    yield _count("runs that are not done", len(ds) - done)
-    yield _count("files missing or not as they were written", *_damaged(ds, items, progress))
-    yield _count("files that the manifest does not list", *_strangers(ds, items))
-    yield _count("runs of the table missing, twice or out of order", *_rows(ds))
-    yield _count("runs whose samples are missing or twice", *_samples(ds, items))
+    yield _count_check("runs that are not done", len(ds) - done)
+    yield _count_check(
+        "files missing or not as they were written", *_damaged_files(ds, items, progress)
+    )
+    yield _count_check("files that the manifest does not list", *_unlisted_files(ds, items))
+    yield _count_check("runs of the table missing, twice or out of order", *_wrong_rows(ds))
+    yield _count_check("runs whose samples are missing or twice", *_runs_without_samples(ds, items))
     try:
         read_resolved(ds.folder)
-        yield _count("damage to the resolved plan", 0)
+        yield _count_check("damage to the resolved plan", 0)
     except FormatError as error:
-        yield _count("damage to the resolved plan", 1, [str(error)])
+        yield _count_check("damage to the resolved plan", 1, [str(error)])
     for noun in ("unit", "draw"):
-        yield _count(f"{noun}s in more than one part", *_leaking(ds, noun))
+        yield _count_check(f"{noun}s in more than one part", *_divided_groups(ds, noun))
 
 
-def _count(name: str, count: int, which: list[str] | None = None) -> Check:
+def _count_check(name: str, count: int, which: list[str] | None = None) -> Check:
     more = f": {', '.join(which[:3])}{', ...' if len(which) > 3 else ''}" if which else ""
     return Check(name + more, float(count), 0.0)
 
 
-def _damaged(
+def _damaged_files(
     ds: Dataset, items: list[Item], progress: Callable[[float], Any] | None
 ) -> tuple[int, list[str]]:
     damaged: list[str] = Item("tables", ds.manifest.files, {}).damaged(ds.folder)
@@ -81,7 +83,7 @@ def _damaged(
     return len(damaged), damaged
 
 
-def _strangers(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
+def _unlisted_files(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
     known = {name for item in items for name in item.files}
     there = {
         path.relative_to(ds.folder).as_posix()
@@ -92,7 +94,7 @@ def _strangers(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
     return len(strangers), strangers
 
 
-def _rows(ds: Dataset) -> tuple[int, list[str]]:
+def _wrong_rows(ds: Dataset) -> tuple[int, list[str]]:
     try:
         runs = ds.runs.to_arrow(["run"])["run"].to_pylist()
     except FormatError as error:
@@ -101,7 +103,7 @@ def _rows(ds: Dataset) -> tuple[int, list[str]]:
     return wrong + abs(len(runs) - len(ds)), []
 
 
-def _samples(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
+def _runs_without_samples(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
     """Count the runs without samples in their file, but for those the core refused."""
     import numpy as np
 
@@ -129,7 +131,7 @@ def _samples(ds: Dataset, items: list[Item]) -> tuple[int, list[str]]:
     return len(wrong), wrong
 
 
-def _leaking(ds: Dataset, noun: str) -> tuple[int, list[str]]:
+def _divided_groups(ds: Dataset, noun: str) -> tuple[int, list[str]]:
     try:
         table = ds.runs.to_arrow([noun, "split"])
     except FormatError as error:

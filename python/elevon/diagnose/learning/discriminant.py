@@ -82,10 +82,10 @@ class Discriminant:
         ModuleNotFoundError
             scikit-learn is missing; it names the command that installs the extra.
         """
-        x, y, g = _checked(values, labels, groups)
+        x, y, g = _check_examples(values, labels, groups)
         candidates = SHRINKAGES if shrinkage is None else (shrinkage,)
         best = min((_left_out_loss(x, y, g, value) for value in candidates), key=lambda c: c[0])
-        return _fit(x, y, best[1], best[2])
+        return _fit_discriminant(x, y, best[1], best[2])
 
     def distances(self, values: npt.ArrayLike) -> Floats:
         """Return the squared distance of each recording to each class."""
@@ -110,7 +110,7 @@ class Discriminant:
         return np.asarray((x < self.low - width) | (x > self.high + width))
 
 
-def _checked(
+def _check_examples(
     values: npt.ArrayLike, labels: Sequence[str], groups: npt.ArrayLike
 ) -> tuple[Floats, npt.NDArray[np.str_], npt.NDArray[np.generic]]:
     x = np.asarray(values, dtype=np.float64)
@@ -124,7 +124,9 @@ def _checked(
     return x, y, g
 
 
-def _fit(x: Floats, y: npt.NDArray[np.str_], shrinkage: float, temperature: float) -> Discriminant:
+def _fit_discriminant(
+    x: Floats, y: npt.NDArray[np.str_], shrinkage: float, temperature: float
+) -> Discriminant:
     classes = np.unique(y)
     means = np.array([x[y == name].mean(axis=0) for name in classes])
     residual = x - means[np.searchsorted(classes, y)]
@@ -134,7 +136,9 @@ def _fit(x: Floats, y: npt.NDArray[np.str_], shrinkage: float, temperature: floa
     scale = np.where(varies, scale, np.maximum(np.abs(means).max(axis=0), 1.0))
     scatter = shrinkage * np.eye(x.shape[1])
     if varies.any():
-        scatter[np.ix_(varies, varies)] = _scatter(x[:, varies] / scale[varies], y, shrinkage)
+        scatter[np.ix_(varies, varies)] = _shrunk_scatter(
+            x[:, varies] / scale[varies], y, shrinkage
+        )
     return Discriminant(
         tuple(str(name) for name in classes), means / scale, scale,
         np.asarray(np.linalg.inv(scatter), dtype=np.float64), x.min(axis=0), x.max(axis=0),
@@ -142,7 +146,7 @@ def _fit(x: Floats, y: npt.NDArray[np.str_], shrinkage: float, temperature: floa
     )  # fmt: skip
 
 
-def _scatter(x: Floats, y: npt.NDArray[np.str_], shrinkage: float) -> Floats:
+def _shrunk_scatter(x: Floats, y: npt.NDArray[np.str_], shrinkage: float) -> Floats:
     """Return the shrunk scatter about the classes' means, by degrees of freedom.
 
     The features have a deviation of one each, so that the library shrinks to their diagonal.
@@ -167,7 +171,7 @@ def _left_out_loss(
         test = g == group
         if set(y[test]) - set(y[~test]) or len(np.unique(y[~test])) < 2:
             continue  # a class would be missing: this group cannot be left out
-        fitted = _fit(x[~test], y[~test], shrinkage, 1.0)
+        fitted = _fit_discriminant(x[~test], y[~test], shrinkage, 1.0)
         scores.append(-0.5 * fitted.distances(x[test]))
         truth.append(np.searchsorted(fitted.classes, y[test]))
     if not scores or len({score.shape[1] for score in scores}) != 1:

@@ -87,12 +87,12 @@ def learn(
         if labels is not None:
             raise InputError("--labels: a data set has its own labels")
         return _learn_dataset(data, unit, pole_pairs, seed, progress)
-    items = _listed(logs)
+    items = _one_by_one(logs)
     if labels is None or not isinstance(labels, (str, os.PathLike)):
         known = [LabelledLog()] * len(items) if labels is None else list(labels)
     else:
         known = read_labels(labels, [i.name if isinstance(i, Log) else Path(i) for i in items])
-    return learn_logs(_read(items), known, unit, pole_pairs, seed=seed, progress=progress)
+    return learn_logs(_read_files(items), known, unit, pole_pairs, seed=seed, progress=progress)
 
 
 def learn_logs(
@@ -188,11 +188,11 @@ def as_dataset(given: LogsLike | Dataset) -> Dataset | None:
     return None
 
 
-def _listed(logs: LogsLike | Dataset) -> list[Log | str | os.PathLike[str]]:
+def _one_by_one(logs: LogsLike | Dataset) -> list[Log | str | os.PathLike[str]]:
     return [logs] if isinstance(logs, (Log, str, os.PathLike)) else list(logs)  # type: ignore[arg-type]
 
 
-def _read(items: Sequence[Log | str | os.PathLike[str]]) -> list[Log]:
+def _read_files(items: Sequence[Log | str | os.PathLike[str]]) -> list[Log]:
     """Return logs, read where they are files; days may bear one name, and have other rates."""
     paths = [Path(item) for item in items if not isinstance(item, Log)]
     imported = iter(read_logs(paths, one_rate=False) if paths else ())

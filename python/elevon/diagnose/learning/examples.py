@@ -109,7 +109,7 @@ def examples_of_logs(
     kinds = tuple(sorted({k.label for k in known} - {HEALTHY}))
     units = tuple(next(k.severity_unit for k in known if k.label == kind) for kind in kinds)
     present = np.array([[k.label == kind for kind in kinds] for k in known])
-    names, values = _varied(items)
+    names, values = _shared_varied_numbers(items)
     return Examples(
         names, values, kinds, present,
         np.where(present, np.array([[k.severity] for k in known]), 0.0), units,
@@ -169,7 +169,7 @@ def examples_of_dataset(
     by = "unit" if table["unit"].nunique() > 1 else "draw"
     numbers = chosen[by].to_numpy(dtype=np.int64).tolist()
     unit = np.array([f"{by} {number}" for number in numbers])
-    names, values = _varied(items)
+    names, values = _shared_varied_numbers(items)
     examples = Examples(
         names, values, kinds, severity != 0.0, severity,
         tuple(item["unit"] or "1" for item in ds.manifest.faults), unit,
@@ -178,7 +178,7 @@ def examples_of_dataset(
     return examples, KnownMotion.spanning(items), lost, rows
 
 
-def _varied(items: Sequence[LoggedMotion]) -> tuple[tuple[str, ...], Floats]:
+def _shared_varied_numbers(items: Sequence[LoggedMotion]) -> tuple[tuple[str, ...], Floats]:
     """Return the numbers that all logs have and that are not the same in all of them."""
     shared = set.intersection(*(set(item.values) for item in items))
     names = [name for name in items[0].values if name in shared]

@@ -107,12 +107,12 @@ def learned_classes(
     views, reports = {}, {}
     changes = examples.against_baselines(seed)
     sets = {ABSOLUTE: examples}
-    if _teaches(changes, examples):
+    if _shows_every_class(changes, examples):
         sets[RELATIVE] = changes
     for number, (name, these) in enumerate(sets.items()):
         if progress is not None and not progress(number / len(sets)):
             raise Interrupted("interrupted before the training ended")
-        views[name], reports[name] = _view(these, seed, exclusive=examples.exclusive)
+        views[name], reports[name] = _train_view(these, seed, exclusive=examples.exclusive)
     share = np.clip(examples.present.mean(axis=0), 1e-6, 1.0 - 1e-6)
     classes = LearnedClasses(
         examples.names, examples.kinds, examples.severity_units, examples.exclusive, share, motion,
@@ -147,7 +147,7 @@ def _counts(examples: Examples) -> dict[str, int]:
     return counts | ({HEALTHY: healthy} if healthy else {})
 
 
-def _teaches(changes: Examples, examples: Examples) -> bool:
+def _shows_every_class(changes: Examples, examples: Examples) -> bool:
     """Whether changes against baselines show every class, of more than one unit."""
     enough = changes.present.sum(axis=0) >= _LEAST
     several = len(set(changes.unit.tolist())) > 1
@@ -155,25 +155,27 @@ def _teaches(changes: Examples, examples: Examples) -> bool:
     return bool(several and most and changes.healthy.sum() >= _LEAST and enough.all())
 
 
-def _view(examples: Examples, seed: int, *, exclusive: bool) -> tuple[ClassView, dict[str, Any]]:
+def _train_view(
+    examples: Examples, seed: int, *, exclusive: bool
+) -> tuple[ClassView, dict[str, Any]]:
     """Train one classifier on all examples, judge it by groups that are left out."""
     methods = ("discriminant", "boosting") if exclusive else ("boosting",)
-    judged = {m: _left_out(examples, examples.unit, m, seed, exclusive) for m in methods}
-    warmth = {m: _warmth(left, examples, exclusive) for m, left in judged.items()}
+    judged = {m: _judge_left_out(examples, examples.unit, m, seed, exclusive) for m in methods}
+    warmth = {m: _best_temperature(left, examples, exclusive) for m, left in judged.items()}
     best = min(warmth, key=lambda m: warmth[m][0])
     temperature = warmth[best][1]
     left = judged[best]
     scores = left.scores / temperature
-    discriminant, trees = _trained(examples, best, seed, exclusive, chosen=True)
+    discriminant, trees = _train_classifier(examples, best, seed, exclusive, chosen=True)
     healthy = examples.healthy[left.rows]
     logits = fault_logits(scores[healthy], discriminant.classes, exclusive)
     severities, sized = _severities(examples, seed)
-    named = _named(examples, left.rows, scores, discriminant.classes, exclusive)
+    named = _named_from(examples, left.rows, scores, discriminant.classes, exclusive)
     view = ClassView(discriminant, trees, temperature, logits, left.distances, named, severities)
-    counted = {"unit": _judged(left, examples, exclusive)}
+    counted = {"unit": _counted(left, examples, exclusive)}
     if len(set(examples.condition.tolist())) > 1:
-        others = _left_out(examples, examples.condition, best, seed, exclusive)
-        counted["condition"] = _judged(others, examples, exclusive)
+        others = _judge_left_out(examples, examples.condition, best, seed, exclusive)
+        counted["condition"] = _counted(others, examples, exclusive)
     report = {
         "logs": len(examples.values), "classes": _counts(examples), "classifier": best,
         "loss": {m: row[0] for m, row in warmth.items()}, "left_out": counted,
@@ -181,16 +183,16 @@ def _view(examples: Examples, seed: int, *, exclusive: bool) -> tuple[ClassView,
     return view, report | ({"severities": sized} if sized else {})
 
 
-def _left_out(
+def _judge_left_out(
     examples: Examples, groups: Strings, method: str, seed: int, exclusive: bool
 ) -> _LeftOut:
     """What is said of each log by the others' groups; logs whose class they lack are left out."""
     rows, scores, distances = [], [], []
     for test in _folds(groups):
         part = examples.take(np.flatnonzero(~test))
-        if not _complete(part, examples):
+        if not _has_every_class(part, examples):
             continue
-        fit, trees = _trained(part, method, seed, exclusive)
+        fit, trees = _train_classifier(part, method, seed, exclusive)
         values = examples.values[test]
         rows.append(np.flatnonzero(test))
         scores.append(raw_scores(fit, trees, values, exclusive))
@@ -202,7 +204,7 @@ def _left_out(
     return _LeftOut(np.concatenate(rows), np.vstack(scores), np.concatenate(distances))
 
 
-def _complete(part: Examples, examples: Examples) -> bool:
+def _has_every_class(part: Examples, examples: Examples) -> bool:
     """Whether a part has every class of the whole."""
     there = part.present.any(axis=0) == examples.present.any(axis=0)
     return bool(there.all() and part.healthy.any())
@@ -216,7 +218,7 @@ def _folds(groups: Strings) -> Iterator[Bools]:
         yield np.isin(groups, names[k::most])
 
 
-def _trained(
+def _train_classifier(
     examples: Examples, method: str, seed: int, exclusive: bool, *, chosen: bool = False
 ) -> tuple[Discriminant, Trees | None]:
     """Return discriminant and trees; where `chosen`, the discriminant's shrinkage is."""
@@ -230,27 +232,29 @@ def _trained(
         examples.values, examples.labels.tolist(), groups,
         shrinkage=None if chosen else SHRINKAGES[1],
     )  # fmt: skip
-    return discriminant, None if method == "discriminant" else _boosted(examples, seed, exclusive)
+    return discriminant, None if method == "discriminant" else _train_trees(
+        examples, seed, exclusive
+    )
 
 
-def _boosted(examples: Examples, seed: int, exclusive: bool) -> Trees:
+def _train_trees(examples: Examples, seed: int, exclusive: bool) -> Trees:
     from sklearn.ensemble import GradientBoostingClassifier
 
     values = examples.values.astype(np.float32)
-    model = GradientBoostingClassifier(**_options(len(values), seed))
+    model = GradientBoostingClassifier(**_boosting_options(len(values), seed))
     if exclusive:
         return Trees.of(model.fit(values, examples.labels))
     return Trees.joined([Trees.of(model.fit(values, there)) for there in examples.present.T])
 
 
-def _options(count: int, seed: int) -> dict[str, Any]:
+def _boosting_options(count: int, seed: int) -> dict[str, Any]:
     return {
         "init": "zero", "learning_rate": _RATE, "subsample": 0.7, "max_features": "sqrt",
         "random_state": seed, **(_FEW_TREES if count < _MANY else _MANY_TREES),
     }  # fmt: skip
 
 
-def _warmth(left: _LeftOut, examples: Examples, exclusive: bool) -> tuple[float, float]:
+def _best_temperature(left: _LeftOut, examples: Examples, exclusive: bool) -> tuple[float, float]:
     """Log loss of what groups left out say, and the temperature at which it is least."""
     labels = examples.labels
     right = np.searchsorted(np.unique(labels), labels[left.rows])
@@ -277,7 +281,7 @@ def _named_kinds(
     return np.asarray(classes[scores.argmax(axis=1)][:, None] == np.array(kinds)[None, :])
 
 
-def _judged(left: _LeftOut, examples: Examples, exclusive: bool) -> dict[str, Any]:
+def _counted(left: _LeftOut, examples: Examples, exclusive: bool) -> dict[str, Any]:
     """Counts of what groups left out say, by the most probable class or kinds above one half."""
     there, healthy = examples.present[left.rows], examples.healthy[left.rows]
     kinds = _named_kinds(left.scores, examples.kinds, exclusive, np.unique(examples.labels))
@@ -290,7 +294,7 @@ def _judged(left: _LeftOut, examples: Examples, exclusive: bool) -> dict[str, An
     }  # fmt: skip
 
 
-def _named(
+def _named_from(
     examples: Examples, rows: Rows, scores: Floats, classes: tuple[str, ...], exclusive: bool
 ) -> Floats:
     """Return the least severity from which on single faults are named, shape (f,)."""
@@ -340,7 +344,7 @@ def _sized_kind(examples: Examples, number: int, seed: int) -> _SizedKind:
     start, trees = _size_trees(part.values, sizes, seed)
     low, high = min(float(severity.min()), 0.0), max(float(severity.max()), 0.0)
     return _SizedKind(
-        start, trees, low, high, _conformal(errors), len(severity), float(np.median(errors))
+        start, trees, low, high, _conformal_error(errors), len(severity), float(np.median(errors))
     )
 
 
@@ -349,7 +353,7 @@ def _size_trees(values: Floats, sizes: Floats, seed: int) -> tuple[float, Trees]
     from sklearn.ensemble import GradientBoostingRegressor
 
     start = float(sizes.mean())
-    options = _options(len(sizes), seed) | {"n_estimators": _ROUNDS}
+    options = _boosting_options(len(sizes), seed) | {"n_estimators": _ROUNDS}
     model = GradientBoostingRegressor(**options)
     return start, Trees.of(model.fit(values.astype(np.float32), sizes - start))
 
@@ -363,7 +367,7 @@ def _sizes_left_out(part: Examples, sizes: Floats, seed: int) -> Floats:
     return out
 
 
-def _conformal(errors: Floats) -> float:
+def _conformal_error(errors: Floats) -> float:
     """Return the error whose rank holds `_COVERED` of the next ones."""
     rank = min(math.ceil(_COVERED * (len(errors) + 1)), len(errors))
     return float(np.sort(errors)[rank - 1])

@@ -222,7 +222,7 @@ class LearnedClasses:
         """
         view = self.views[RELATIVE if relative else ABSOLUTE]
         scores = view.scores(values, exclusive=self.exclusive)
-        probability, p_fault = self._joined(scores, view.discriminant.classes)
+        probability, p_fault = self._join_logs(scores, view.discriminant.classes)
         fault = float(fault_logits(scores, view.discriminant.classes, self.exclusive).max())
         far = float(view.discriminant.distances(values).min(axis=1).max())
         ranks = [
@@ -231,9 +231,11 @@ class LearnedClasses:
         ]
         # Of several logs the most faulty one decides, so each has a part of the rate.
         chance, unlike = (min(len(values) * float(rank), 1.0) for rank in ranks)
-        return ClassOpinion(probability, p_fault, chance, unlike, self._severity(view, values))
+        return ClassOpinion(
+            probability, p_fault, chance, unlike, self._join_severities(view, values)
+        )
 
-    def _joined(self, scores: Floats, classes: Sequence[str]) -> tuple[dict[str, float], float]:
+    def _join_logs(self, scores: Floats, classes: Sequence[str]) -> tuple[dict[str, float], float]:
         """Return the probability of each kind and of any, by all logs together."""
         if self.exclusive:
             total = (scores - np.logaddexp.reduce(scores, axis=1)[:, None]).sum(axis=0)
@@ -246,7 +248,9 @@ class LearnedClasses:
         p_fault = 1.0 - float(np.prod(1.0 - there))
         return dict(zip(self.kinds, there.tolist(), strict=True)), p_fault
 
-    def _severity(self, view: ClassView, values: Floats) -> dict[str, tuple[float, float, float]]:
+    def _join_severities(
+        self, view: ClassView, values: Floats
+    ) -> dict[str, tuple[float, float, float]]:
         """Return severities by the mean size of the logs."""
         if view.severities is None:
             return {}
@@ -301,7 +305,7 @@ class LearnedModel:
         if self.spread is not None:
             about["spread"] = self.spread.to_dict()
         if self.classes is not None:
-            about["classes"], arrays = _stored_classes(self.classes)
+            about["classes"], arrays = _classes_to_archive(self.classes)
         arrays["about"] = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
@@ -317,7 +321,7 @@ class LearnedModel:
             The file is absent, damaged, of another version or something else.
         """
         try:
-            about, arrays = _read(Path(path))
+            about, arrays = _read_archive(Path(path))
             spread, classes = about.get("spread"), about.get("classes")
             return cls(
                 None if spread is None else LearnedSpread.from_dict(spread),
@@ -328,7 +332,7 @@ class LearnedModel:
             raise FormatError(f"{path}: is no model of elevon learn: {error}") from error
 
 
-def _read(path: Path) -> tuple[dict[str, Any], Arrays]:
+def _read_archive(path: Path) -> tuple[dict[str, Any], Arrays]:
     if not path.is_file():
         raise ValueError("is no regular file")
     with zipfile.ZipFile(path) as archive:
@@ -353,7 +357,7 @@ _OF_SEVERITIES = ("start", "low", "high", "reach")
 _OF_MOTION = ("pace", "seconds", "off", "faster", "longer")
 
 
-def _stored_classes(classes: LearnedClasses) -> tuple[dict[str, Any], Arrays]:
+def _classes_to_archive(classes: LearnedClasses) -> tuple[dict[str, Any], Arrays]:
     """Return the JSON part and the arrays of a classifier."""
     arrays: Arrays = {"command": classes.motion.command, "share": classes.share}
     for name, view in classes.views.items():

@@ -126,23 +126,23 @@ def learned_spread(
         raise InputError(f"{len(logs)} logs, but units and days of {len(pairs)}")
     candidates = candidates_of(actuator)
     readings = [reading_of(log, actuator) for log in logs]
-    _apart(readings)
+    _refuse_same_recording(readings)
     tests = []
-    for group in _groups(readings):
+    for group in _logs_by_test(readings):
         members = [(item, pairs[k]) for k, item in group]
-        tests.append(_test(members, candidates))
+        tests.append(_residuals_of_test(members, candidates))
         done = sum(len(t.models) for t in tests) / len(logs)
         if progress is not None and not progress(0.9 * done):
             raise Interrupted(f"interrupted after {sum(len(t.models) for t in tests)} logs")
     residuals = [t.residuals for t in tests]
-    rows = [row for k, t in enumerate(tests) for row in _rows(k, t, residuals, candidates)]
+    rows = [row for k, t in enumerate(tests) for row in _held_out_logs(k, t, residuals, candidates)]
     return LearnedSpread(
         actuator.name, len(logs), len({unit for unit, _ in pairs}), len(set(pairs)),
         fitted(residuals), tuple(rows),
     )  # fmt: skip
 
 
-def _rows(
+def _held_out_logs(
     number: int,
     test: _Test,
     residuals: Sequence[TestResiduals],
@@ -162,16 +162,16 @@ def _rows(
         spread = known[unit, day]
         others = np.flatnonzero((r.unit == r.unit[k]) & (r.day != r.day[k]))
         near = others[np.searchsorted(others, k) % len(others)] if len(others) else None
-        alone = _chance(test, k, [], spread, candidates)
+        alone = _held_out_chance(test, k, [], spread, candidates)
         # The next day, in turn.
-        based = 1.0 if near is None else _chance(test, k, [int(near)], spread, candidates)
+        based = 1.0 if near is None else _held_out_chance(test, k, [int(near)], spread, candidates)
         if min(alone, based) < SUSPECT:
-            _warn_of(item, _chance(test, k, others.tolist(), spread, candidates))
+            _warn_of(item, _held_out_chance(test, k, others.tolist(), spread, candidates))
         group = units.index(unit) if len(units) > 1 else days.index(day)
         yield HeldOutLog(number, group, alone, based)
 
 
-def _chance(
+def _held_out_chance(
     test: _Test,
     number: int,
     others: Sequence[int],
@@ -200,7 +200,7 @@ def _warn_of(item: Reading, chance: float) -> None:
         )
 
 
-def _apart(readings: Sequence[Reading]) -> None:
+def _refuse_same_recording(readings: Sequence[Reading]) -> None:
     """Refuse one recording under two names: it would count as two days that are alike."""
     known: dict[bytes, str] = {}
     for item in readings:
@@ -210,7 +210,7 @@ def _apart(readings: Sequence[Reading]) -> None:
         known[key] = item.name
 
 
-def _groups(items: Sequence[Reading]) -> list[list[tuple[int, Reading]]]:
+def _logs_by_test(items: Sequence[Reading]) -> list[list[tuple[int, Reading]]]:
     """Logs by test, each with its number."""
     out: list[list[tuple[int, Reading]]] = []
     for k, item in enumerate(items):
@@ -222,7 +222,7 @@ def _groups(items: Sequence[Reading]) -> list[list[tuple[int, Reading]]]:
     return out
 
 
-def _test(
+def _residuals_of_test(
     members: Sequence[tuple[Reading, tuple[str, str]]], candidates: Sequence[CandidateFault]
 ) -> _Test:
     first, later = members[0][0].matched([item for item, _ in members[1:]])
@@ -257,16 +257,16 @@ def fitted(tests: Sequence[TestResiduals]) -> dict[str, FeatureSpread]:
     """Return what healthy logs show of each feature's spread and mismatch."""
     out = {}
     for name in dict.fromkeys(n for test in tests for n in test.names):
-        columns = [_column(test, name) for test in tests if name in test.names]
+        columns = [_one_feature(test, name) for test in tests if name in test.names]
         units = sorted({str(u) for c in columns for u in c.unit})
-        scatter = [row for unit in units if (row := _scatter(columns, unit)) is not None]
-        days, worth = _days(scatter)
+        scatter = [row for unit in units if (row := _scatter_of_unit(columns, unit)) is not None]
+        days, worth = _days_factor(scatter)
         daily = (worth + days.value * days.runs) / (worth + days.runs)
-        out[name] = FeatureSpread(days, _mismatch(columns, units, daily), worth)
+        out[name] = FeatureSpread(days, _mismatch_factor(columns, units, daily), worth)
     return out
 
 
-def _column(test: TestResiduals, name: str) -> TestResiduals:
+def _one_feature(test: TestResiduals, name: str) -> TestResiduals:
     """One feature of a test."""
     at = [test.names.index(name)]
     return replace(
@@ -275,7 +275,7 @@ def _column(test: TestResiduals, name: str) -> TestResiduals:
     )  # fmt: skip
 
 
-def _scatter(columns: Iterable[TestResiduals], unit: str) -> tuple[float, float] | None:
+def _scatter_of_unit(columns: Iterable[TestResiduals], unit: str) -> tuple[float, float] | None:
     """Mean square of a unit's steps over the stated variance, and its degrees; None of one day.
 
     It is half the mean square of differences between logs of different days, each pair alike:
@@ -296,7 +296,7 @@ def _scatter(columns: Iterable[TestResiduals], unit: str) -> tuple[float, float]
     return (max(float(np.mean(ratios)), 0.0), max(degrees)) if ratios else None
 
 
-def _days(scatter: Sequence[tuple[float, float]]) -> tuple[VarianceFactor, float]:
+def _days_factor(scatter: Sequence[tuple[float, float]]) -> tuple[VarianceFactor, float]:
     """The mean square of steps, and what the stated one is worth beside it.
 
     Where several units differ, both are worth less for the next one.
@@ -307,11 +307,11 @@ def _days(scatter: Sequence[tuple[float, float]]) -> tuple[VarianceFactor, float
     value = sum(n * square for square, n in scatter) / total
     share = 1.0
     if len(scatter) > 1:
-        share = 1.0 / (1.0 + (STATED + total) / _between(scatter, max(value, 1e-9)))
+        share = 1.0 / (1.0 + (STATED + total) / _worth_between_units(scatter, max(value, 1e-9)))
     return VarianceFactor(value, share * total), max(share * STATED, 1.0)
 
 
-def _between(scatter: Sequence[tuple[float, float]], value: float) -> float:
+def _worth_between_units(scatter: Sequence[tuple[float, float]], value: float) -> float:
     """Runs that what is known of all units is worth for one: its scatter follows Fisher's law."""
     from scipy.stats import f as fisher
 
@@ -322,7 +322,7 @@ def _between(scatter: Sequence[tuple[float, float]], value: float) -> float:
     return float(weight.sum() / np.sum(weight / _WORTH))
 
 
-def _mismatch(
+def _mismatch_factor(
     columns: Sequence[TestResiduals], units: Sequence[str], daily: float
 ) -> VarianceFactor:
     """The mean square of offsets; tests of one unit share it, so they count once.
@@ -331,7 +331,7 @@ def _mismatch(
     """
     total, runs = 0.0, 0.0
     for unit in units:
-        rows = [_centre(c, unit, daily) for c in columns if (c.unit == unit).any()]
+        rows = [_unit_mean(c, unit, daily) for c in columns if (c.unit == unit).any()]
         weights = [(stated / (stated + of_mean)) ** 2 for _, of_mean, stated in rows]
         ratios = [centre**2 / (stated + of_mean) for centre, of_mean, stated in rows]
         total += float(np.mean(np.multiply(weights, ratios)))
@@ -339,7 +339,7 @@ def _mismatch(
     return VarianceFactor(total / runs, runs)
 
 
-def _centre(c: TestResiduals, unit: str, daily: float) -> tuple[float, float, float]:
+def _unit_mean(c: TestResiduals, unit: str, daily: float) -> tuple[float, float, float]:
     """A unit's mean over its days, the variance that days and noise give it, the stated one."""
     mine = c.unit == unit
     days = [mine & (c.day == d) for d in sorted(set(c.day[mine].tolist()))]
