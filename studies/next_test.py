@@ -223,8 +223,7 @@ class _Bench:
     ) -> list[Any]:  # fmt: skip
         """Run tests, each on another day; what the logs show, in the order of the cases' names."""
         from elevon.bench.rig import setups
-        from elevon.bench.traces import recorded
-        from elevon.bench.virtual import traced
+        from elevon.bench.traces import recorded, traced
         from elevon.diagnose.positions.log import prepared
         from elevon.diagnose.positions.reading import logged_features
         from elevon.scenario.compile import signal_records

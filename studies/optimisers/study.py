@@ -218,7 +218,7 @@ Job = tuple[str, "Setup", "Log", "Log"]
 def _logs(unit: Actuator, cases: Sequence[str], seed: int, seeds: int) -> list[Job]:
     from elevon.bench.procedure import load_procedure
     from elevon.bench.rig import setups
-    from elevon.bench.virtual import first_trace
+    from elevon.bench.traces import first_trace
     from elevon_cases.torino.bench_unit import logs_of
 
     procedure = first_trace(load_procedure(_PROCEDURE))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from elevon.bench import steps
+from elevon.bench import procedure
 from elevon.bench.rig import Hx711
 from elevon.bench.spring import STANDARD_WIRES, SpringTask, design_spring, search_springs
 from elevon.errors import InputError
@@ -64,24 +64,24 @@ def test_micrometer_reproduces_the_printed_columns(shared):
         shared / "reference" / "tables" / "torino_backlash.csv", delimiter=",", skip_header=2
     )
     for _, d, mw, _, calculated, _, measured, _ in table:
-        assert steps.centre_distance(d) == pytest.approx(mw, abs=0.015)
-        assert steps.geometric_backlash(d) == pytest.approx(calculated, abs=1.5e-4)
-        assert steps.measured_backlash(d) == pytest.approx(measured, abs=1e-12)
+        assert procedure.centre_distance(d) == pytest.approx(mw, abs=0.015)
+        assert procedure.geometric_backlash(d) == pytest.approx(calculated, abs=1.5e-4)
+        assert procedure.measured_backlash(d) == pytest.approx(measured, abs=1e-12)
 
 
 def test_micrometer_inverts():
     for curve in ("geometric", "measured"):
         for reading in np.linspace(9.0, 14.0, 21):
-            backlash = steps.total_backlash(reading, curve)
-            assert steps.micrometer_for(backlash, curve) == pytest.approx(reading, abs=1e-9)
-    assert steps.total_backlash(14.0) == steps.INTRINSIC_BACKLASH
+            backlash = procedure.total_backlash(reading, curve)
+            assert procedure.micrometer_for(backlash, curve) == pytest.approx(reading, abs=1e-9)
+    assert procedure.total_backlash(14.0) == procedure.INTRINSIC_BACKLASH
     for bad in (8.9, 14.1, math.nan):
         with pytest.raises(InputError):
-            steps.centre_distance(bad)
+            procedure.centre_distance(bad)
     with pytest.raises(InputError, match="slide sets"):
-        steps.micrometer_for(0.2)
+        procedure.micrometer_for(0.2)
     with pytest.raises(InputError, match="geometric"):
-        steps.total_backlash(14.0, "guess")
+        procedure.total_backlash(14.0, "guess")
 
 
 def test_converter_counts_and_clips():

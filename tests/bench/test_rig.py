@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.bench.procedure import Procedure, load_procedure, procedure_names
+from elevon.bench.procedure import INTRINSIC_BACKLASH, Procedure, load_procedure, procedure_names
 from elevon.bench.rig import BrakeRig, CellState, brake_loop, setups
 from elevon.bench.run import claim_bench, run_procedure
-from elevon.bench.steps import INTRINSIC_BACKLASH
 from elevon.bench.traces import finished_logs
 from elevon.cli import main
 from elevon.documents import Document, validated

@@ -8,10 +8,9 @@ import pytest
 from elevon import Actuator, Recording
 from elevon.bench.acquisition import acquire, internal_steps
 from elevon.bench.loaded import ForceLoop, target_force
-from elevon.bench.procedure import Procedure, load_procedure, procedure_names
+from elevon.bench.procedure import ForceStep, Procedure, load_procedure, procedure_names
 from elevon.bench.run import run_procedure, stand_setups
 from elevon.bench.stand import stand_names, stand_of, stands
-from elevon.bench.steps import ForceStep
 from elevon.documents import Document, validated
 from elevon.errors import InputError
 from elevon.parameters.load import set_names

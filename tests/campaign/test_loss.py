@@ -252,8 +252,10 @@ def test_a_run_is_prepared_without_asking_the_catalogue_again(plan, monkeypatch)
     monkeypatch.setattr(
         resolved_module, "prepare", lambda *a, **k: requests.append(1) or usual(*a, **k)
     )
-    idle = check_module._idle
-    monkeypatch.setattr(check_module, "_idle", lambda *a: requests.append(2) or idle(*a))
+    idle = check_module._settings_without_effect
+    monkeypatch.setattr(
+        check_module, "_settings_without_effect", lambda *a: requests.append(2) or idle(*a)
+    )
     resolved = resolve_plan(*load_plan(plan(500)))
     check_module.check(resolved)
     assert requests.count(1) == 1

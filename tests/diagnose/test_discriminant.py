@@ -5,6 +5,7 @@ import pytest
 from elevon.diagnose.learning.classify import share_interval
 
 from elevon.diagnose.learning.discriminant import Discriminant
+from elevon.diagnose.learning.fit import share_interval
 from elevon.errors import InputError
 
 

@@ -12,8 +12,7 @@ import pytest
 from elevon import Actuator
 from elevon.bench.procedure import Procedure
 from elevon.bench.rig import setups
-from elevon.bench.traces import recorded
-from elevon.bench.virtual import traced
+from elevon.bench.traces import recorded, traced
 from elevon.diagnose.monitor import Monitor
 from elevon.diagnose.monitor.by_positions import ROLES
 from elevon.diagnose.monitor.filter import ChangeFilter, WindowSpread

@@ -2,8 +2,7 @@
 
 from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import setups
-from elevon.bench.traces import recorded
-from elevon.bench.virtual import first_trace, traced
+from elevon.bench.traces import first_trace, recorded, traced
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch
 

@@ -8,8 +8,7 @@ import pytest
 from elevon import Actuator
 from elevon.bench.procedure import load_procedure
 from elevon.bench.rig import setups
-from elevon.bench.traces import recorded
-from elevon.bench.virtual import first_trace, traced
+from elevon.bench.traces import first_trace, recorded, traced
 from elevon.errors import UnknownNameError
 from elevon.scenario.compile import signal_records
 from elevon.simulate import Run, simulate_batch

@@ -105,8 +105,7 @@ def logs_of(
     SimulationError
         `whole`, and a run did not reach its end.
     """
-    from elevon.bench.traces import recorded
-    from elevon.bench.virtual import traced
+    from elevon.bench.traces import recorded, traced
     from elevon.scenario.compile import signal_records
     from elevon.simulate import Run, completed, simulate_batch
 

@@ -121,7 +121,7 @@ def reproduce_fmeca(*, seed: int = 0, progress: Progress | None = None) -> Fmeca
 
 def _setup(unit: Actuator, fault: str, seed: int) -> Setup:
     from elevon.bench.procedure import load_procedure
-    from elevon.bench.virtual import first_trace
+    from elevon.bench.traces import first_trace
 
     procedure = first_trace(load_procedure("loaded"))
     return setups(procedure, unit, faults=[fault] if fault else [], seed=seed)[0]

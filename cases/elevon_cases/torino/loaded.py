@@ -121,8 +121,7 @@ def reproduce_loaded(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.bench.procedure import load_procedure
-    from elevon.bench.steps import INTRINSIC_BACKLASH
+    from elevon.bench.procedure import INTRINSIC_BACKLASH, load_procedure
     from elevon.parameters.relations import motor_torque_constant
 
     unit, model = hidden_and_calibrated(seed, part(progress, 0.0, 0.25))

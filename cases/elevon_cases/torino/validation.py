@@ -184,7 +184,7 @@ def encoder_count(actuator: Actuator) -> float:
 
 def backlash_at(model: Actuator, reading: float) -> float:
     """Return the model's total backlash [rad]: what was calibrated, and what the reading adds."""
-    from elevon.bench.steps import measured_backlash
+    from elevon.bench.procedure import measured_backlash
 
     added = measured_backlash(reading) - measured_backlash(READINGS[0])
     return model.parameters.value("backlash.total") + added

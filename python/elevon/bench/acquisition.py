@@ -10,8 +10,8 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
+from elevon.bench.procedure import SensorStep
 from elevon.bench.stand import ChannelSpec, Stand
-from elevon.bench.steps import SensorStep
 from elevon.errors import InputError
 from elevon.recording import Recording
 from elevon.simulate import solver_step

@@ -14,10 +14,16 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.acquisition import acquire, acquired
-from elevon.bench.procedure import Procedure
+from elevon.bench.procedure import (
+    ForceStep,
+    Procedure,
+    RigStep,
+    SensorStep,
+    SettingsStep,
+    TraceStep,
+)
 from elevon.bench.rig import BenchSetup, Conditions, draw_conditions, moved, moved_command
 from elevon.bench.stand import ForceSpec, Stand
-from elevon.bench.steps import ForceStep, RigStep, SensorStep, SettingsStep, TraceStep
 from elevon.errors import DivergedError, InputError, unknown
 from elevon.faults import Fault
 from elevon.progress import Progress

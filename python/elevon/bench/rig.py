@@ -12,9 +12,18 @@ import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.bench import steps
-from elevon.bench.procedure import Procedure
-from elevon.bench.steps import SpringStep, WeightsStep
+from elevon.bench.procedure import (
+    BacklashStep,
+    BrakeStep,
+    ForceStep,
+    Procedure,
+    RigStep,
+    SensorStep,
+    SettingsStep,
+    SpringStep,
+    TraceStep,
+    WeightsStep,
+)
 from elevon.errors import InputError, RangeError
 from elevon.faults import Fault
 from elevon.scenario import Scenario
@@ -397,7 +406,7 @@ class BenchSetup:
         What chance set.
     """
 
-    trace: steps.TraceStep
+    trace: TraceStep
     actuator: Actuator
     scenario: Scenario
     conditions: Conditions
@@ -477,10 +486,10 @@ def setups(
     rig = Rig()
     setups: list[Setup] = []
     for step in procedure.step:
-        if isinstance(step, steps.TraceStep):
+        if isinstance(step, TraceStep):
             conditions = draw_conditions(seed, len(setups))
             setups.append(_setup(step, rig, actuator, conditions, faults))
-        elif isinstance(step, steps.ForceStep | steps.RigStep | steps.SensorStep):
+        elif isinstance(step, ForceStep | RigStep | SensorStep):
             raise InputError(f"{procedure.name}: the rotary bench has no {step.kind!r}")
         else:
             rig = _changed(rig, step)
@@ -497,25 +506,21 @@ def _check(actuator: Actuator) -> None:
 
 def _changed(
     rig: Rig,
-    step: steps.BacklashStep
-    | steps.BrakeStep
-    | steps.SpringStep
-    | steps.WeightsStep
-    | steps.SettingsStep,
+    step: BacklashStep | BrakeStep | SpringStep | WeightsStep | SettingsStep,
 ) -> Rig:
-    if isinstance(step, steps.BacklashStep):
+    if isinstance(step, BacklashStep):
         return replace(rig, backlash=step.value())
-    if isinstance(step, steps.BrakeStep):
+    if isinstance(step, BrakeStep):
         return replace(rig, brake=step.terms)
-    if isinstance(step, steps.SpringStep):
+    if isinstance(step, SpringStep):
         return replace(rig, springs=springs_of(step))
-    if isinstance(step, steps.WeightsStep):
+    if isinstance(step, WeightsStep):
         return replace(rig, weights=weights_of(step))
     return replace(rig, settings={**rig.settings, **step.parameters})
 
 
 def _setup(
-    step: steps.TraceStep,
+    step: TraceStep,
     rig: Rig,
     actuator: Actuator,
     conditions: Conditions,
@@ -576,7 +581,7 @@ def _loads(
     return {"brake": {"terms": resist}, "output": {"terms": output}}
 
 
-def moved_command(step: steps.TraceStep, start: float) -> dict[str, Any]:
+def moved_command(step: TraceStep, start: float) -> dict[str, Any]:
     """Return a step's command, its waveforms and actions later by `start` [s]."""
     data: dict[str, Any] = step.command.model_dump(exclude_unset=True, mode="json")
     if "terms" in data:

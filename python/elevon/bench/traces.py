@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
+from elevon.bench.procedure import BacklashStep, Procedure, TraceStep
 from elevon.bench.rig import RATE, Hx711, Setup
 from elevon.errors import FormatError, InputError, OutputExistsError
 from elevon.files import check_output, write_text
 from elevon.logs.command.fit import FREE
+from elevon.logs.command.note import CommandNote
 from elevon.logs.formats.drive import DriveFormat, write_drive_csv
 from elevon.logs.formats.loadcell import write_loadcell
+from elevon.logs.log import Log
 from elevon.parameters.records import wirings
 from elevon.recording import Recording
+from elevon.recording import Recording as Built
 from elevon.recording.csv import description_path
 from elevon.units import format_quantity, parse_quantity
 from elevon.worklog import Item, WorkLog
@@ -238,3 +242,83 @@ def _waveform(term: Any) -> dict[str, Any]:
         value = parse_quantity(given, unit, name)
         shape[name] = format_quantity(value, label, 12)
     return shape
+
+
+def first_trace(procedure: Procedure) -> Procedure:
+    """Return a procedure up to its first trace, with the unit's own backlash."""
+    steps = []
+    for step in procedure.step:
+        if not isinstance(step, BacklashStep):
+            steps.append(step)
+        if isinstance(step, TraceStep):
+            break
+    return procedure.model_copy(update={"step": tuple(steps)})
+
+
+def traced(
+    setup: Setup,
+    recording: Recording,
+    *,
+    cell: float = 1.0,
+    noise: Mapping[str, float] | None = None,
+) -> Log:
+    """Return the log that the bench writes of a run.
+
+    Parameters
+    ----------
+    setup : Setup
+        From `elevon.bench.rig.setups`.
+    recording : Recording
+        Its run, with what `elevon.bench.traces.recorded` says.
+    cell : float
+        Brake torque measured over the true one.
+    noise : mapping of str to float, optional
+        Deviation of white noise on channels of the log, SI.
+    """
+    from elevon.logs.brake import brake_of
+
+    signals = drive_signals(setup, recording)
+    rng = np.random.default_rng([setup.conditions.seed, 7])
+    for name, deviation in (noise or {}).items():
+        signals[name] = signals[name] + deviation * rng.standard_normal(len(signals[name]))
+    time, note = signals["time"], _noted(setup)
+    cell_log = _cell(setup, recording, cell)
+    channels = {
+        "speed_ref": signals["speed_ref"],
+        "motor_speed": signals["motor_speed"],
+        "torque_current": signals["current_q_meas"],
+        "current_ref": signals["current_ref"],
+        "motor_position": signals["resolver_position"],
+        "output_position": signals["encoder_position"],
+        "torque_voltage": signals["voltage_q_ref"],
+    }
+    if "current_d_meas" in signals:
+        channels["direct_current"] = signals["current_d_meas"]
+    brake = brake_of(cell_log, note, time, 0.0, channels["motor_speed"])
+    return Log(setup.trace.name, time, channels, note=note, brake=brake)
+
+
+def _noted(setup: Setup) -> CommandNote:
+    """What the operator notes of the command: a single waveform."""
+    from elevon.units import parse_quantity
+    from elevon.waveforms import unit_of, wave_records
+
+    term = setup.trace.command.terms[0]
+    parameters = {
+        p.name: parse_quantity(term.arguments[p.name], unit_of(p, "rad"), p.name)
+        for p in wave_records()[term.kind].parameters
+        if p.name in term.arguments and p.name not in {"start", "end", "time", "phase"}
+    }
+    return CommandNote("", term.kind, parameters, brake=setup.brake is not None)
+
+
+def _cell(setup: Setup, recording: Recording, factor: float) -> Recording:
+    """Return a recording of the brake's torque by the load cell, on the drive's clock."""
+    signals = cell_signals(setup, recording)
+    if signals is None:
+        return recording
+    time, force = signals
+    equipment = setup.rig.equipment
+    torque = factor * force * equipment.arm / equipment.chain_ratio
+    clock = setup.conditions.trigger + time * (1.0 + setup.conditions.cell.clock_drift)
+    return Built.build(clock, {"load_cell_torque": torque}, {"load_cell_torque": "N m"})

@@ -10,12 +10,19 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.bench.loaded import loaded_setups, run_loaded
-from elevon.bench.procedure import POSITION, Procedure, load_procedure, standard_tests
+from elevon.bench.procedure import (
+    POSITION,
+    BrakeStep,
+    ForceStep,
+    Procedure,
+    SettingsStep,
+    TraceStep,
+    load_procedure,
+    standard_tests,
+)
 from elevon.bench.rig import setups
 from elevon.bench.stand import stand_of
-from elevon.bench.steps import BrakeStep, ForceStep, SettingsStep, TraceStep
-from elevon.bench.traces import recorded
-from elevon.bench.virtual import first_trace, traced
+from elevon.bench.traces import first_trace, recorded, traced
 from elevon.calibrate.ways import turns
 from elevon.diagnose.by_model import reading_of
 from elevon.diagnose.engine.candidates import CandidateFault

@@ -7,26 +7,29 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from typing import Any
 
+import numpy as np
+
 from elevon.actuator import Actuator
-from elevon.errors import ArgumentTypeError, InputError, unknown
+from elevon.errors import ArgumentTypeError, InputError, Interrupted, unknown
 from elevon.faults import Fault
 from elevon.parameters.records import record_of
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.scenario.compile import port_units
-from elevon.session.coupling import coupled
 from elevon.session.fmu import Fmu
 from elevon.session.values import (
     SessionState,
     SignalIndex,
     Value,
     announced,
+    callable_or_none,
     diverged_error,
     diverged_runs,
     fault_places,
     input_change,
     left_out,
     one_each,
+    positive_seconds,
     runs_of,
     text,
     texts,
@@ -362,8 +365,6 @@ class Session:
         progress: Progress | None = None,
     ) -> list[Recording]:
         """Run on, calling an own controller at each tick of `period`; see `run_loop`."""
-        from elevon.session.loop import run_loop
-
         return run_loop(self, duration, controller, period=period, record=record, progress=progress)
 
     def save(self) -> SessionState:
@@ -408,3 +409,161 @@ def _one_wiring(prepared: Sequence[Prepared]) -> str:
     if len(wirings) > 1:
         raise InputError(f"the runs of a session have one wiring; got {', '.join(wirings)}")
     return wirings.pop()
+
+
+def coupled(session: Session, controller: Fmu | None, loads: Sequence[Fmu]) -> Coupling | None:
+    """Return what is coupled to a session that begins; None of nothing."""
+    if controller is None and not len(loads):
+        return None
+    coupling = Coupling(controller, loads)
+    coupling.bind(session)
+    return coupling
+
+
+class Coupling:
+    """Foreign FMUs beside a session.
+
+    Parameters
+    ----------
+    controller : Fmu, optional
+        Steps first, so that it acts from the tick on at which it reads.
+    loads : sequence of Fmu
+        Act with what they put out at a tick, and step beside the actuator.
+    """
+
+    def __init__(self, controller: Fmu | None, loads: Sequence[Fmu]) -> None:
+        given: list[Any] = [*([] if controller is None else [controller]), *loads]
+        wrong = [item for item in given if not isinstance(item, Fmu)]
+        if wrong:
+            raise ArgumentTypeError(f"controller, loads: {wrong[0]!r:.60} is no elevon.Fmu")
+        self._controller, self._loads = controller, list(loads)
+        self._all: list[Fmu] = given
+
+    def bind(self, session: Session) -> None:
+        """Join them to a session that begins."""
+        for item in self._all:
+            item.bind(session)
+        joined = [port for item in self._all for port in item.outputs()]
+        twice = next((port for port in joined if joined.count(port) > 1), None)
+        if twice is not None:
+            raise InputError(f"{twice}: two outputs of FMUs are joined to it")
+
+    def portions(self, session: Session, steps: int, done: int) -> Iterator[int]:
+        """Yield the solver steps from tick to tick; before each the FMUs whose tick it is act."""
+        every = {id(item): round(item.period / session.step) for item in self._all}
+        while steps:
+            self._act(session, [item for item in self._all if done % every[id(item)] == 0])
+            count = min(steps, *(size - done % size for size in every.values()))
+            yield count
+            steps, done = steps - count, done + count
+
+    def _act(self, session: Session, due: Sequence[Fmu]) -> None:
+        loads = [item for item in self._loads if item in due]
+        for item in loads:
+            session.set(**item.outputs())
+        if self._controller in due and self._controller is not None:
+            self._controller.advance(session)
+            session.set(**self._controller.outputs())
+        for item in loads:
+            item.advance(session)
+
+
+Controller = Callable[["Session"], Any]
+
+
+def run_loop(
+    session: Session,
+    duration: float | str,
+    controller: Controller | None = None,
+    *,
+    period: float | str = "1 ms",
+    record: Iterable[str] = ("command", "output_position"),
+    progress: Progress | None = None,
+) -> list[Recording]:
+    """Run a session, calling a controller at each of its ticks.
+
+    Parameters
+    ----------
+    session : Session
+        One run or a batch; it stands at the end afterwards.
+    duration : float or str
+        s, or with a unit: a whole number of periods.
+    controller : callable, optional
+        Called with the session at every tick, before the drive sees that instant. What it returns
+        is the command, in the SI unit of its mode (of a batch shape (runs,)); or a mapping of
+        inputs, as for `Session.set`; or None: nothing changes.
+    period : float or str
+        Of the ticks: a whole number of solver steps.
+    record : iterable of str
+        Signals sampled at every tick, before the controller is called.
+    progress : callable, optional
+        Called with the done fraction; returning False interrupts.
+
+    Returns
+    -------
+    list of Recording
+        One a run, on one clock of that period, the last instant included.
+
+    Raises
+    ------
+    InputError
+        As `Session.advance`, `Session.set` and `Session.read`.
+    DivergedError
+        As `Session.advance`: a loop does not go on without one of its runs.
+    Interrupted
+        `progress` returned False.
+    """
+    seconds = positive_seconds(period, "period")
+    ticks = round(positive_seconds(duration, "duration") / seconds)
+    if ticks < 1:
+        raise InputError(f"duration = {duration} is shorter than a period ({seconds:g} s)")
+    names = texts(record, "record")
+    callable_or_none(controller, "controller")
+    callable_or_none(progress, "progress")
+    start = session.time
+    table = np.empty((ticks + 1, len(session), len(names)))
+    for tick in range(ticks):
+        table[tick] = _sample(session, names)
+        _act(session, controller)
+        session.advance(seconds)
+        if progress is not None and progress((tick + 1) / ticks) is False:
+            raise Interrupted(f"interrupted at {session.time:.6g} s of simulated time")
+    table[ticks] = _sample(session, names)
+    time = start + seconds * np.arange(ticks + 1)
+    return [_recording(session, run, time, names, table[:, run]) for run in range(len(session))]
+
+
+def _sample(session: Session, names: list[str]) -> Any:
+    read = session.read(*names)
+    return np.column_stack([np.atleast_1d(read[name]) for name in names])
+
+
+def _act(session: Session, controller: Controller | None) -> None:
+    answer = None if controller is None else controller(session)
+    if isinstance(answer, Mapping):
+        session.set(**{text(name, "input"): value for name, value in answer.items()})
+    elif answer is not None:
+        session.set(command=answer)
+
+
+def _recording(session: Session, run: int, time: Any, names: list[str], values: Any) -> Recording:
+    from elevon.scenario.compile import signal_units
+
+    units = dict(signal_units(session.wiring, session.fidelity))
+    units["command"] = session.unit("command", run) or units["command"]
+    actuator = session.actuators[run]
+    status, message = session.state_of(run)
+    return Recording.build(
+        time,
+        {name: values[:, column] for column, name in enumerate(names)},
+        {name: units[name] or "1" for name in names},
+        clock="controller",
+        rate=1.0 / (time[1] - time[0]),
+        meta={
+            "status": status,
+            "message": message,
+            "actuator": actuator.name,
+            "fidelity": session.fidelity,
+            "parameter_hash": actuator.hash,
+        },
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from elevon.plain import WORKING, Plain, in_unit, key
 from elevon.results import Result
@@ -232,6 +232,13 @@ class Diagnosis(Result):
     KIND: ClassVar = "diagnosis"
     TABLE: ClassVar = "faults"
     COLUMNS: ClassVar = ("kind", "place", "probability", "severity", "unit", "interval")
+
+    def to_dict(self, *, stored: bool = True) -> dict[str, Any]:
+        """Return the JSON form; `prior` stands in it where classes were learnt."""
+        data = super().to_dict(stored=stored)
+        if not self.prior:
+            del data["prior"]
+        return data
 
     @property
     def alarm(self) -> bool:
