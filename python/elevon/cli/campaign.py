@@ -394,7 +394,7 @@ def split(
     seed : int
         Seed of the dealing.
     """
-    from elevon.campaign.resplit import resplit
+    from elevon.campaign.folder import resplit
 
     counts = resplit(folder, _shares(share), by=by, seed=seed)
     return Answer(
