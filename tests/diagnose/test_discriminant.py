@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from elevon.diagnose.learning.classify import share_interval
 
 from elevon.diagnose.learning.discriminant import Discriminant
 from elevon.diagnose.learning.fit import share_interval
