@@ -73,7 +73,7 @@ def test_what_no_candidate_moves_is_seen_by_roles_too(screw, gear):
     assert not {"current_mean", "creeping_current"} & set(names)
 
 
-def test_what_nobody_ever_saw_healthy_has_no_unknown_fault(screw, tmp_path):
+def test_of_a_unit_that_nobody_ever_saw_healthy_nothing_is_decided(screw, tmp_path):
     """A file that no logs were calibrated to may be another unit's; a calibrated one is not."""
     path = tmp_path / "unit.toml"
     value = screw.parameters.value("motor.inertia")
@@ -86,9 +86,39 @@ def test_what_nobody_ever_saw_healthy_has_no_unknown_fault(screw, tmp_path):
     few = ["backlash@transmission"]
     odd = [replace(hum, recording=None)]
     answers = [diagnose(odd, unit, faults=few) for unit in (screw, Actuator.load(path))]
-    assert [a.status for a in answers] == ["model_does_not_fit", "unknown_fault"]
+    assert [a.status for a in answers] == ["undecided", "unknown_fault"]
     assert any("give a baseline, or calibrate" in text for text in answers[0].findings)
     assert (answers[0].alarm, answers[0].best, answers[0].hypotheses) == (False, (), ())
+    # Neither healthy nor faulty, whatever the log shows; what it measures stands beside the file's.
+    worn = log(screw, {"kind": "backlash", "place": "transmission", "severity": "0.4 mm"}, day=3)
+    for each in (item, worn):
+        answer = diagnose([each], screw, faults=few)
+        assert (answer.status, answer.best, answer.faults) == ("undecided", (), ())
+        assert (answer.alarm, answer.would_be_seen, answer.alternatives) == (False, {}, ())
+    assert answer.headline.startswith("UNDECIDED: this unit was never seen healthy; furthest from ")
+    apart = max(answer.features, key=lambda m: abs(m.score))
+    assert f"{apart.name.replace('_', ' ')} " in answer.headline
+    assert diagnose([worn], Actuator.load(path), faults=few).best == ("backlash@transmission",)
+    assert diagnose([worn], screw, faults=few, unit_known=True).best == ("backlash@transmission",)
+
+
+def test_a_healthy_answer_says_what_would_have_been_seen(screw):
+    """Backlash as large as is said raises an alarm in nine of ten days; a tenth of it does not."""
+    few = ["backlash@transmission"]
+    base = [log(screw, day=1, name="base")]
+    answer = diagnose([log(screw, day=2, name="h")], screw, baselines=base, faults=few)
+    assert answer.status == "healthy"
+    assert set(answer.would_be_seen) == {"backlash@transmission"}
+    least = answer.would_be_seen["backlash@transmission"]
+    assert "; would be seen: backlash from " in answer.headline
+
+    def alarms(severity):
+        fault = {"kind": "backlash", "place": "transmission", "severity": severity}
+        logs = [log(screw, fault, day=10 + k, name="w") for k in range(10)]
+        return sum(diagnose([x], screw, baselines=base, faults=few).alarm for x in logs)
+
+    assert alarms(least) >= 7  # of ten, nine expected; fewer than seven: 1.3 %
+    assert alarms(0.1 * least) <= 3  # at 5 %: more than three: 0.1 %
 
 
 def test_two_faults_of_a_screw_are_named_together(screw):

@@ -10,7 +10,7 @@ from elevon.bench.acquisition import acquired_signals
 from elevon.bench.loaded import loaded_setups, run_loaded
 from elevon.bench.procedure import load_procedure
 from elevon.bench.stand import stand_of
-from elevon.diagnose.door import diagnose
+from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.vibration import answer
 from elevon.diagnose.vibration.answer import PassReading, shows_passes
 from elevon.features.envelope import ball_passes, envelope_orders
@@ -91,7 +91,7 @@ def log_of(fault, seed):
 @pytest.mark.parametrize(("place", "size"), [("nut", 1e-3), ("ball", 5e-4), ("groove", 2e-3)])
 def test_a_spall_on_the_bench_is_named_with_its_length(place, size):
     log, screw = log_of(f"spall@screw.{place}={size}", seed=11)
-    result = diagnose(log, screw)
+    result = diagnose([log], screw, unit_known=True)
     assert result.best == (f"spall@screw.{place}",)
     (cause,) = result.faults
     assert cause.interval[0] < size < cause.interval[1]
@@ -103,5 +103,5 @@ def test_a_healthy_screw_is_none():
     log, screw = log_of(None, seed=12)
     assert shows_passes(log, screw)
     assert PassReading(log, screw).measured().turns[0] > 2.0
-    result = diagnose(log, screw)
+    result = diagnose([log], screw, unit_known=True)
     assert (result.status, result.best) == ("healthy", ())

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from elevon.diagnose.engine.answer import Cause, Diagnosis, FaultPlace, Reason
+from elevon.diagnose.engine.answer import Cause, Diagnosis, FaultPlace, Moved, Reason
 from elevon.diagnose.engine.page import folded, sentence, severity_text, verdict
 
 
@@ -42,6 +42,21 @@ def test_the_first_line_is_the_answer():
     assert verdict(worn) == "FAULTY: backlash +0.30 mm (0.15 to 0.45), p = 0.98"
     well = replace(worn, status="healthy", best=(), faults=(), p_fault=0.03)
     assert verdict(well) == "HEALTHY (p = 0.97)"
+    units = {"backlash@transmission": "rad", "short@motor.phase_a": "1", "sag@supply": "1"}
+    limits = {"backlash@transmission": 0.0005, "short@motor.phase_a": 0.18}
+    least = replace(well, would_be_seen=limits, severity_units=units)
+    assert verdict(least) == (
+        "HEALTHY (p = 0.97); 1 of 3 candidates would not be seen, would be seen: "
+        "backlash from 0.0286 deg, short from 18 %"
+    )
+    assert "In nine of ten such logs 1 of 3 candidates would not be seen" in sentence(least)
+    gap = Moved("a.csv", "lost_motion", "rad", 0.0152, 0.0065, 0.001, 0.0)
+    open_answer = replace(well, status="undecided", features=(gap,))
+    assert verdict(open_answer) == (
+        "UNDECIDED: this unit was never seen healthy; furthest from the file: "
+        "lost motion 0.871 deg (file 0.372)"
+    )
+    assert "not decided" in sentence(open_answer)
     reason = Reason("dry_current", 0.5, 0.2)
     gated = verdict(replace(well, status="model_does_not_fit", reason=reason))
     assert gated.startswith("MODEL DOES NOT FIT: dry_current (current that changes sign with the ")

@@ -12,8 +12,8 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.calibrate.ways import turns
 from elevon.diagnose.engine.candidates import chosen, not_candidates
-from elevon.diagnose.engine.case import case_of
-from elevon.diagnose.engine.diagnosis import answer_of
+from elevon.diagnose.engine.case import calibrated, case_of
+from elevon.diagnose.engine.diagnosis import NEVER_SEEN, UNDECIDED, answer_of
 from elevon.diagnose.engine.reading import ReplayUnit
 from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
 from elevon.diagnose.positions.closed_form import diagnose_by_form
@@ -157,6 +157,7 @@ def diagnose(
     faults: Sequence[str] | None = None,
     false_alarm: float = 0.05,
     spread: LearnedSpread | None = None,
+    unit_known: bool = False,
 ) -> Diagnosis:
     """Say what is wrong with the unit that wrote the logs: which fault or pair of faults.
 
@@ -174,6 +175,10 @@ def diagnose(
         Rate at which a healthy unit may be called faulty.
     spread : LearnedSpread, optional
         Of healthy days and of the model's mismatch; default: what the package states.
+    unit_known : bool
+        Whether the actuator file is this unit by construction, as of a simulation of it. Else the
+        unit is known by a calibration, by a healthy log or by a spread; without any of them the
+        answer is ``undecided``.
 
     Raises
     ------
@@ -184,16 +189,22 @@ def diagnose(
     check_request(logs, false_alarm)
     wanted = turns(actuator) and not faults
     sign = diagnose_by_form(logs, baselines, actuator, false_alarm) if wanted else None
+    seen_healthy = unit_known or bool(baselines) or spread is not None or calibrated(actuator)
+
+    def early(answer: Diagnosis) -> Diagnosis:
+        answer = answer if seen_healthy else _undecided(answer)
+        return replace(answer, seconds=clock.perf_counter() - begin)
+
     if sign is not None:
-        return replace(sign, seconds=clock.perf_counter() - begin)
+        return early(sign)
     healthy = [reading_of(log, actuator) for log in baselines]
     items = [reading_of(log, actuator) for log in logs]
     broken = None if faults else _broken(logs, items, baselines, healthy, false_alarm)
     if broken is not None:
-        return replace(broken, seconds=clock.perf_counter() - begin)
+        return early(broken)
     heard, notes = _heard(logs, actuator, faults, false_alarm, alone=not baselines)
     if heard is not None:
-        return replace(heard, seconds=clock.perf_counter() - begin)
+        return early(heard)
     candidates = chosen(faults, actuator)
     cases = [case_of(item, candidates, healthy, spread) for item in items]
     if spread is not None and not any(n in spread.features for c in cases for n in c.unit.names):
@@ -201,15 +212,26 @@ def diagnose(
             f"--model: the spread was learnt of {spread.actuator}; none of its features is in "
             "these logs"
         )
-    result = answer_of(cases, candidates, false_alarm, spread)
+    result = answer_of(cases, candidates, false_alarm, spread, unit_known=unit_known)
     if spread is not None:
         notes = (*notes, *_of_the_spread(spread, actuator, false_alarm, len(logs)))
     blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
-    early = (text for log in logs for text in unsound(log))
-    findings = (*early, *result.findings, *notes)
+    bad = (text for log in logs for text in unsound(log))
+    findings = (*bad, *result.findings, *notes)
     return replace(
         result, unobservable=blind, findings=findings, seconds=clock.perf_counter() - begin
     )
+
+
+def _undecided(answer: Diagnosis) -> Diagnosis:
+    """Return an answer for a unit whose healthy state is not known: no cause is named."""
+    from elevon.diagnose.engine.page import ALONE, verdict
+
+    seen = ALONE + (verdict(answer).partition(": ")[2] or "no fault stands out")
+    return replace(
+        answer, status=UNDECIDED, faults=(), best=(), hypotheses=(), alternatives=(),
+        findings=(seen, *answer.findings, NEVER_SEEN),
+    )  # fmt: skip
 
 
 def _of_the_spread(

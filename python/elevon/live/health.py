@@ -67,7 +67,7 @@ class Health(Plain):
     ----------
     status : str
         ``waiting``, or as in a diagnosis: ``healthy``, ``faulty``, ``unknown_fault``,
-        ``model_does_not_fit``.
+        ``model_does_not_fit``, ``undecided``.
     faults : tuple of NamedFault
         Most probable first.
     p_fault : float or None
@@ -120,11 +120,16 @@ def examine(
     log: Log | str, actuator: Actuator, baselines: Sequence[str], mission: str | None
 ) -> Health:
     """Diagnose a log (runs in the worker process)."""
-    from elevon.diagnose.door import diagnose
+    from elevon.diagnose.by_model import diagnose
+    from elevon.logs.read import as_logs
 
     begin = clock.process_time()
     try:
-        answer = diagnose(log, actuator, list(baselines), false_alarm=FALSE_ALARM)
+        healthy = as_logs(list(baselines)) if baselines else []
+        # The page simulates this very file, so its healthy state is known by construction.
+        answer = diagnose(
+            as_logs(log), actuator, baselines=healthy, false_alarm=FALSE_ALARM, unit_known=True
+        )
     except ElevonError as error:
         return Health(text=str(error).partition(": ")[2] or str(error))
     remaining = ""

@@ -293,6 +293,8 @@ def _verdict(health: Mapping[str, Any]) -> tuple[str, str]:
         return "green", f"Healthy: p(fault) {health['p_fault']:.2f}"
     if health["status"] == "waiting":
         return "grey", health["text"].capitalize()
+    if health["status"] == "undecided":
+        return "grey", "Undecided: this unit was never seen healthy"
     if not health["faults"]:
         return "red", health["status"].replace("_", " ")
     fault = health["faults"][0]

@@ -393,7 +393,7 @@ def write_stamp(
 
 
 #: Answers that state no severity: written down they would read as "no fault seen".
-_SILENT = ("unknown_fault", "model_does_not_fit")
+_SILENT = ("unknown_fault", "model_does_not_fit", "undecided")
 
 
 @dataclass(frozen=True)

@@ -151,10 +151,11 @@ class Diagnosis(Result):
         The logs.
     status : str
         ``healthy``; ``faulty``; ``unknown_fault``: no candidate explains the logs, nor a healthy
-        unit; ``model_does_not_fit``: the model does not show what the healthy unit shows. The last
-        two name no faults and have a `reason`.
+        unit; ``model_does_not_fit``: the model does not show what the healthy unit shows;
+        ``undecided``: no healthy state of this unit is known, neither a calibration nor a healthy
+        log of the test. The last three name no faults and have a `reason`.
     p_fault : float
-        Probability of any fault.
+        Probability of any fault; where `status` is ``undecided``, if the unit were the file's.
     false_alarm : float
         Rate the status was set for.
     chance : float
@@ -171,6 +172,10 @@ class Diagnosis(Result):
         Smallest severity of each fault that moves the features by `SEEN` deviations.
     features : tuple of Moved
         Against the healthy unit.
+    would_be_seen : dict of str to float
+        Of a healthy answer: severity from which on each candidate would have raised an alarm in
+        nine of ten such logs, the most frequent fault first. A candidate that is missing would
+        not have been seen at any severity up to the catalogue's limit.
     findings : tuple of str
         What the caller should know.
     seconds : float
@@ -202,7 +207,7 @@ class Diagnosis(Result):
     """
 
     logs: tuple[str, ...]
-    status: Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit"]
+    status: Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit", "undecided"]
     p_fault: float
     false_alarm: float
     chance: float
@@ -217,6 +222,7 @@ class Diagnosis(Result):
     hypotheses: tuple[Explanation, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
     severity_units: Mapping[str, str] = field(default_factory=dict)
+    would_be_seen: Mapping[str, float] = field(default_factory=dict)
     p_other: float = 0.0
     reason: Reason | None = None
     actuator: str = ""

@@ -11,6 +11,7 @@ import numpy as np
 from elevon.diagnose.engine.answer import SEEN, Diagnosis, Reason
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import (
+    DRAWS,
     Detector,
     LogCase,
     allowed,
@@ -30,6 +31,7 @@ from elevon.diagnose.engine.explain import (
     moved,
     refuting,
     unexplained,
+    would_be_seen,
 )
 from elevon.diagnose.engine.likelihood import Hypothesis
 from elevon.diagnose.engine.lookalikes import lookalike_findings, share_lookalikes
@@ -40,13 +42,15 @@ from elevon.diagnose.engine.spread import LearnedSpread
 _ALL = 128  # pairs of faults that are all scored; of more the most promising of a faulty log
 _MOST = 16
 _WORTH = 0.01  # probability from which on a set of faults is worth a run
+_RANKED = 40  # chances at which the rank among learnt days is asked
 _UNKNOWN = 0.5  # probability of no candidate from which on none is named
 NEVER_SEEN = (
-    "no healthy log of this unit is known, neither a baseline nor a calibration: give a baseline, "
-    "or calibrate (elevon calibrate)"
+    "no healthy state of this unit is known, neither by a calibration nor by a healthy log of each "
+    "test: give a baseline, or calibrate (elevon calibrate)"
 )
 MISFIT: Literal["model_does_not_fit"] = "model_does_not_fit"
-Status = Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit"]
+UNDECIDED: Literal["undecided"] = "undecided"
+Status = Literal["healthy", "faulty", "unknown_fault", "model_does_not_fit", "undecided"]
 
 
 def answer_of(
@@ -54,6 +58,8 @@ def answer_of(
     candidates: Sequence[CandidateFault],
     rate: float,
     spread: LearnedSpread | None = None,
+    *,
+    unit_known: bool = False,
 ) -> Diagnosis:
     """Return the answer of logs that stand against their healthy unit.
 
@@ -67,6 +73,9 @@ def answer_of(
         Of false alarms.
     spread : LearnedSpread, optional
         That the cases stand on.
+    unit_known : bool
+        Whether this unit's healthy state is known otherwise than by its calibration, by healthy
+        logs of each test or by the spread.
     """
     begin = clock.perf_counter()
     residual, root, detector = detector_of(cases, candidates)
@@ -81,9 +90,14 @@ def answer_of(
     best = _best(result, faulty=faulty)
     known = {c.key: c for c in candidates}
     named = [(known[key], value) for key, value in zip(best.keys, best.best, strict=True)]
-    status, reason, findings = _status(cases, result, named, faulty=faulty)
+    unit_known |= spread is not None or all(case.unit_known for case in cases)
+    status, reason, findings = _status(cases, result, named, faulty=faulty, unit_known=unit_known)
     clear = status in ("healthy", "faulty")
     keys, values = (best.keys, best.best) if clear else ((), ())
+    visible = {}
+    if status == "healthy":
+        threshold = _threshold(detector, cases, rate, spread)
+        visible = would_be_seen(cases, seen, root, detector, threshold)
     return Diagnosis(
         logs=tuple(case.name for case in cases),
         status=status,
@@ -102,11 +116,12 @@ def answer_of(
             *(lookalike_findings(seen, result, keys) if status == "faulty" else ()),
         ),
         seconds=clock.perf_counter() - begin,
-        hypotheses=explanations(result, candidates) if status != MISFIT else (),
-        alternatives=alternatives(result, cases, candidates, keys),
+        hypotheses=explanations(result, candidates) if status not in (MISFIT, UNDECIDED) else (),
+        alternatives=alternatives(result, cases, candidates, keys) if status != UNDECIDED else (),
         severity_units={c.key: c.unit for c in candidates},
         p_other=result.other,
         reason=reason,
+        would_be_seen=visible,
     )
 
 
@@ -144,9 +159,8 @@ def _judged(
     log the rank among those that the spread was learnt of must say so, too: draws that are too
     narrow raise no alarm that it does not.
     """
-    plausible = [case.plausible for case in cases]
-    share = SHARE if any(item.names for item in plausible) else 0.0
-    odd = chance_of_any(plausible) / SHARE
+    share = _plausible_share(cases)
+    odd = chance_of_any([case.plausible for case in cases]) / SHARE
     chance = min(detector.chance(score) / (1.0 - share), 1.0, odd)
     faulty = score > detector.threshold(rate * (1.0 - share)) or odd <= rate
     if spread is not None and len(cases) == 1:
@@ -155,22 +169,43 @@ def _judged(
     return chance, faulty
 
 
+def _plausible_share(cases: Sequence[LogCase]) -> float:
+    """Return the share of the false alarms that what no candidate moves has."""
+    return SHARE if any(case.plausible.names for case in cases) else 0.0
+
+
+def _threshold(
+    detector: Detector, cases: Sequence[LogCase], rate: float, spread: LearnedSpread | None
+) -> float:
+    """Return the detector's score from which on logs are called faulty, as `_judged` does."""
+    left = 1.0 - _plausible_share(cases)
+    if spread is None or len(cases) > 1:
+        return detector.threshold(rate * left)
+    chances = np.geomspace(rate, 1.0 / DRAWS, _RANKED)
+    baselines = cases[0].unit.baselines
+    passed = [chance for chance in chances if spread.rank(chance, baselines, rate) <= rate]
+    return detector.threshold(passed[0] * left) if passed else np.inf
+
+
 def _status(
     cases: Sequence[LogCase],
     result: Posterior,
     named: Sequence[tuple[CandidateFault, float]],
     *,
     faulty: bool,
+    unit_known: bool,
 ) -> tuple[Status, Reason | None, tuple[str, ...]]:
     """Return the verdict, why no cause is named, and the findings on what named faults leave.
 
-    What is named explains the logs better than anything else, and no feature refutes it. What no
-    candidate explains is a fault only where this unit's healthy state is known; else the actuator
-    file is as likely to be another unit's.
+    Nothing is decided where this unit's healthy state is not known: a deviation from the actuator
+    file is then as likely the file's. What is named explains the logs better than anything else,
+    and no feature refutes it.
     """
     misfit = next((case.misfit for case in cases if case.misfit is not None), None)
     if misfit is not None:
         return MISFIT, misfit, ()
+    if not unit_known:
+        return UNDECIDED, farthest(cases[_worst(cases)]), (NEVER_SEEN,)
     if not faulty:
         return "healthy", None, unexplained(cases, named)
     if not named or result.other >= _UNKNOWN:
@@ -182,8 +217,6 @@ def _status(
             return "faulty", None, unexplained(cases, named)
         names = " and ".join(c.key for c, _ in named)
         text = f"the most probable cause, {names}, is refuted by {against.feature}"
-    if not any(case.unit_known for case in cases):
-        return MISFIT, against, (text, NEVER_SEEN)
     return "unknown_fault", against, (text,)
 
 

@@ -19,6 +19,7 @@ from elevon.diagnose.engine.answer import (
 )
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import (
+    Detector,
     LogCase,
     allowed,
     errors_of,
@@ -33,6 +34,7 @@ LISTED = 0.02  # probability below which a cause is not listed
 POSSIBLE = 1e-3  # probability below which a set of faults is not listed
 REFUTED = 5.0  # deviations that faults leave of one feature: such faults are not named. ASSUMED
 UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a finding
+_NINE_OF_TEN = 1.2816  # deviations that a standard normal number stays below in nine of ten
 _STEPS, _FINER = 100, 20  # severities over the range, and between two of them
 _POINTS = 201  # severities of another fault that are held against a cause
 
@@ -270,6 +272,49 @@ def _least_seen(cases: Sequence[LogCase], c: CandidateFault, root: Floats) -> fl
         least = float(np.ceil(grid[k])) if c.counted else float(grid[k])
         grid = np.linspace(grid[max(k - 1, 0)], least, _FINER + 1)
     return least
+
+
+def would_be_seen(
+    cases: Sequence[LogCase],
+    candidates: Sequence[CandidateFault],
+    root: Floats,
+    detector: Detector,
+    threshold: float,
+) -> dict[str, float]:
+    """Return the severity from which on each candidate raises an alarm in nine of ten logs.
+
+    A log's noise shortens the shift of one in ten by `_NINE_OF_TEN` deviations or more. What is
+    below the threshold even at the largest severity is left out.
+
+    Parameters
+    ----------
+    cases : sequence of LogCase
+        The logs.
+    candidates : sequence of CandidateFault
+        Faults.
+    root : ndarray, shape (k, k)
+        Whitens the features.
+    detector : Detector
+        The test.
+    threshold : float
+        Its score from which on logs are called faulty.
+
+    Returns
+    -------
+    dict of str to float
+        ``KIND@PLACE`` to severity, the most frequent fault first.
+    """
+    out = {}
+    for c in sorted(candidates, key=lambda c: -c.rate):
+        grid = c.range(_STEPS + 1) if c.counted else np.linspace(0.0, c.high, _STEPS + 1)
+        moved_by = shift_of(cases, c.key, grid) @ root.T
+        size = np.linalg.norm(moved_by, axis=1)
+        shorter = np.maximum(1.0 - _NINE_OF_TEN / np.maximum(size, _NINE_OF_TEN), 0.0)
+        unseen = np.flatnonzero(detector.score(moved_by * shorter[:, None]) <= threshold)
+        first = int(unseen[-1]) + 1 if unseen.size else 0
+        if first < len(grid):
+            out[c.key] = float(grid[first])
+    return out
 
 
 def moved(

@@ -131,6 +131,8 @@ def _badge(result: Diagnosis) -> tuple[str, Literal["pass", "fail", "open"]]:
         return ("Not decided", "open") if left else ("Healthy", "pass")
     if result.status == "faulty":
         return f"Faulty: {' and '.join(result.best)}", "fail"
+    if result.status == "undecided":
+        return "Undecided", "open"
     return ("Unknown fault", "fail") if result.alarm else ("Model does not fit", "open")
 
 
@@ -239,6 +241,8 @@ _NAMES = {
     "lubrication_loss@screw": "The screw has lost lubricant:",
     "adapter_gap@adapter": "The adapter's gap has grown by",
 }
+ALONE = "by the log alone: "  # of what an undecided answer shows without the model
+_LISTED = 3  # faults or numbers in the first line
 UNEXPLAINED = "does not explain"  # of the finding that the named faults leave a residual
 
 
@@ -262,12 +266,47 @@ def verdict(result: Diagnosis) -> str:
         return f"MODEL DOES NOT FIT: {_off(result.reason)}; nothing is diagnosed"
     if result.status == "unknown_fault" and result.reason is not None:
         return f"UNKNOWN FAULT: {_off(result.reason)}, p = {_share(result.p_fault)}"
+    if result.status == "undecided":
+        return f"UNDECIDED: this unit was never seen healthy; {_measured(result)}"
     if result.status == "healthy":
         left = next((text for text in result.findings if UNEXPLAINED in text), "")
-        return f"HEALTHY (p = {_share(1.0 - result.p_fault)})" + (f", but {left}" if left else "")
+        seen = _visible(result, _LISTED)
+        return f"HEALTHY (p = {_share(1.0 - result.p_fault)})" + (
+            f", but {left}" if left else f"; {seen}" if seen else ""
+        )
     causes = {f"{c.kind}@{c.place}": c for c in result.faults}
     named = [_named(causes[key]) for key in result.best if key in causes]
     return f"FAULTY: {' and '.join(named)}, p = {_share(result.p_best)}"
+
+
+def _visible(result: Diagnosis, most: int) -> str:
+    """Return what a healthy answer would have shown, the most frequent faults; first what not."""
+    if not result.would_be_seen:
+        return ""
+    hidden = len(result.severity_units) - len(result.would_be_seen)
+    kinds = [name.partition("@")[0] for name in result.severity_units]
+    seen = []
+    for name, value in list(result.would_be_seen.items())[:most]:
+        kind, _, place = name.partition("@")
+        plain = kind.replace("_", " ") + (f" at {place}" if kinds.count(kind) > 1 else "")
+        seen.append(f"{plain} from {severity_text(value, result.severity_units[name])}")
+    first = f"{hidden} of {len(kinds)} candidates would not be seen, " if hidden else ""
+    return f"{first}would be seen: {', '.join(seen)}"
+
+
+def _measured(result: Diagnosis) -> str:
+    """Return what the logs show by themselves beside what the actuator file states."""
+    alone = next((text for text in result.findings if text.startswith(ALONE)), "")
+    if alone:
+        return alone
+    apart = sorted(result.features, key=lambda m: -abs(m.score))
+    texts = []
+    for item in apart[:_LISTED]:
+        unit = display_unit(item.unit)
+        value, file = (float(to_display(x, unit)) for x in (item.value, item.expected))
+        name = item.name.replace("_", " ")
+        texts.append(f"{name} {value:.3g} {unit}".removesuffix(" 1") + f" (file {file:.3g})")
+    return "furthest from the file: " + ", ".join(texts)
 
 
 def folded(cause: Cause) -> list[str]:
@@ -309,17 +348,24 @@ def sentence(result: Diagnosis) -> str:
             "The model does not show what the healthy unit shows: "
             f"{_off(result.reason)}. Nothing is diagnosed."
         )
+    if result.status == "undecided":
+        return (
+            "Whether the unit is healthy is not decided: without a healthy log of it or a "
+            f"calibration a deviation may be the file's; {_measured(result)}."
+        )
     left = any(UNEXPLAINED in text for text in result.findings)
     if result.status == "healthy" and left:
         return (
             "No candidate stands out, but these are not logs of the healthy unit "
             f"either: {next(t for t in result.findings if UNEXPLAINED in t)}."
         )
+    seen = _visible(result, len(result.would_be_seen))
     if result.status == "healthy":
         return (
             f"Nothing here is beyond a healthy unit: it deviates as much in "
             f"{100 * result.chance:.3g} % of logs (called faulty below "
             f"{100 * result.false_alarm:g} %); a fault has a probability of {result.p_fault:.2g}."
+            + (f" In nine of ten such logs {seen}." if seen else "")
         )
     if result.status == "unknown_fault" and result.reason is not None:
         return (

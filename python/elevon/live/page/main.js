@@ -167,7 +167,7 @@ class Page {
   }
 
   health(health) {
-    const words = { faulty: "FAULTY", healthy: "HEALTHY", waiting: "WAITING", unknown_fault: "UNKNOWN FAULT", model_does_not_fit: "MODEL DOES NOT FIT" };
+    const words = { faulty: "FAULTY", healthy: "HEALTHY", waiting: "WAITING", unknown_fault: "UNKNOWN FAULT", model_does_not_fit: "MODEL DOES NOT FIT", undecided: "UNDECIDED" };
     put(by("health"), "data-status", health.status);
     put(by("verdict"), "text", words[health.status] ?? health.status);
     put(by("sentence"), "text", health.text);
