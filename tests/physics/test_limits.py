@@ -321,3 +321,24 @@ def test_link_chopper_and_trips_are_checked_against_each_other(
 def test_a_chopper_below_the_trip_is_not_warned_of() -> None:
     """What stands in order is no finding."""
     assert not findings("nasa-ballscrew", CHOPPER | {"inverter.over_voltage_trip": 500.0})
+
+
+def test_the_current_cut_off_leaves_the_same_mean_in_a_stall() -> None:
+    """A jammed gear: peaks at the cut-off, a fall through the diodes, many periods of rise."""
+    seen = {}
+    for fidelity in ("high", "low"):
+        rec = elevon.simulate(
+            elevon.Actuator.load("pisa-landing-gear"),
+            duration=0.8,
+            faults=["jam@screw=90 kN"],
+            fidelity=fidelity,
+            record="current_mean@1 kHz",
+        )
+        seen[fidelity] = late_half(rec, "current_mean")
+    assert seen["low"] == pytest.approx(seen["high"], rel=0.02)
+
+
+def late_half(rec: Any, name: str) -> float:
+    """Mean of the later half."""
+    values = rec[name].values
+    return float(np.mean(values[len(values) // 2 :]))

@@ -34,11 +34,46 @@ impl<S: Scalar> Lag<S> {
     }
 }
 
+/// Most carrier periods that are followed from cut to cut.
+const LONGEST: usize = 512;
+
+/// Mean current of a pair whose peaks the cut-off ends. In each carrier period the current rises while the pair is on. Where it reaches
+/// the cut-off, all switches open, and two diodes bring it down against the link until the next period; where the demand ends the rise
+/// before, it falls against `off`. With a duty below one there are many periods without a cut: the mean is that from one to the next.
+#[inline(always)]
+fn cut_off<S: Scalar>(m: &Model<S>, [link, along, off]: [S; 3], [resistance, inductance]: [S; 2], duty: S) -> S {
+    let (zero, half, one, two) = (S::zero(), S::splat(0.5), S::one(), S::splat(2.0));
+    let peak = m.c.cutoff;
+    let per_volt = m.c.modulator.period / inductance;
+    let open = link + m.diode_drop + m.diode_drop;
+    let (mut current, mut sum, mut periods, mut cuts) = (peak, zero, zero, zero);
+    for _ in 0..LONGEST {
+        let rise = (per_volt * (link - along - resistance * current)).maximum(S::splat(1e-12));
+        let cut = peak.le(rise.fma(duty, current));
+        let on = S::select(cut, (peak - current).maximum(zero) / rise, duty);
+        let top = rise.fma(on, current);
+        let fall = per_volt * (S::select(cut, open, off) + along + resistance * top);
+        let rest = (one - on).minimum(top / S::select(zero.lt(fall), fall, one));
+        let lasts = S::select(zero.lt(fall), rest, one - on);
+        let bottom = (top - fall * lasts).maximum(zero);
+        // The first cut only sets the phase of the second.
+        let counted = S::indicator(cuts.equals(two));
+        sum = (counted * half).fma((current + top) * on + (top + bottom) * lasts, sum);
+        periods = periods + counted;
+        cuts = cuts + S::indicator(cut);
+        current = bottom;
+        if !S::any(cuts.le(two)) {
+            break;
+        }
+    }
+    S::select(zero.lt(periods), sum / periods.maximum(one), peak)
+}
+
 /// Mean current over a carrier period after a step (`docs/explanation/theory/landing-gear.md`). The continuous current lags, and decays
 /// towards what its circuit drives back; the pulses, which start from none in each period, do not.
 #[inline(always)]
 pub(super) fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair<S>, body: &State<S>, duty: S) -> S {
-    let (zero, one) = (S::zero(), S::one());
+    let (zero, half, one) = (S::zero(), S::splat(0.5), S::one());
     let s = &body.body;
     let speed = s.motion.motor_speed;
     let emf = p.constant * speed;
@@ -71,11 +106,17 @@ pub(super) fn mean_current<S: Scalar>(m: &Model<S>, chopping: Chopping, p: &Pair
     let forced = S::select(zero.lt(duty), S::select(rise.le(zero), back, plugging), zero);
     let settled = S::select(usable, pulsed.maximum(continuous), forced);
     let reached = S::select(usable, pulsed.maximum(lag.to(continuous)), lag.to(forced));
-    let cut = settled.clamp_abs(m.c.cutoff) * sign;
+    let ripple = half * duty * (one - duty) * m.c.modulator.period / inductance * (safe_rise + safe_fall);
+    let cuts = m.c.cutoff.lt(settled + ripple);
+    let mut limit = m.c.cutoff;
+    if S::any(cuts) {
+        limit = S::select(cuts, cut_off(m, [link, along, off], [resistance, inductance], duty), limit);
+    }
+    let cut = settled.clamp_abs(limit) * sign;
     let braking = passive.signed(passive.abs().maximum((cut * passive.sign()).maximum(zero)));
     let rectified = S::select(zero.lt(cut * passive), braking, cut + passive);
     let rectified = share.fma(rectified - body.current, body.current);
-    S::select(passive.equals(zero), reached.clamp_abs(m.c.cutoff) * sign, rectified) * p.closed
+    S::select(passive.equals(zero), reached.clamp_abs(limit) * sign, rectified) * p.closed
 }
 
 /// Share of a carrier period in which the pair, switched off, still carries current (low-side chopping): its pulse falls to
