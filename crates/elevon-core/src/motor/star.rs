@@ -4,7 +4,7 @@
 use super::air_gap::AirGap;
 use super::pole::WeakPole;
 use super::short::{Contacts, KINDS};
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{apart, three_phase, Kernel, Scalar};
 use crate::three;
 use crate::variable::acts::When;
 use crate::variable::View;
@@ -70,16 +70,7 @@ variables! {
             when(&[WARM]);
         FluxTemperatureCoefficient => "flux_temperature_coefficient", "alpha_k", "1/K", Any, Plant, Some(0.0), "relative change of the EMF constant per kelvin of winding temperature",
             when(&[WARM]);
-        ElectricalOffset => "electrical_offset", "theta_0", "rad", Any, Plant, Some(0.0), "electrical angle at the rotor's zero",
-            when(&[In(Low, &[Either(&[
-                SHORTED, Away("motor.open_a", 0.0), Away("motor.open_b", 0.0), Away("motor.open_c", 0.0),
-                Away("motor.eccentricity_static", 0.0), Away("motor.eccentricity_dynamic", 0.0), Away("motor.unbalance_inertia", 0.0),
-                Away("motor.pole_loss", 0.0),
-                Chosen("motor.emf_shape", &["trapezoidal"]), Chosen("drive.commutation", &["six_step"]), Chosen("drive.kind", &["off"]),
-                Chosen("thermal.model", &["quasi_static", "dynamic"]),
-                Away("sensor.current.gain_a", 1.0), Away("sensor.current.gain_b", 1.0), Away("sensor.current.gain_c", 1.0),
-                Away("sensor.resolver.mismatch", 0.0), Away("sensor.resolver.offset", 0.0), Away("sensor.resolver.power_off", 0.0),
-            ])])]);
+        ElectricalOffset => "electrical_offset", "theta_0", "rad", Any, Plant, Some(0.0), "electrical angle at the rotor's zero";
     }
 }
 
@@ -156,6 +147,20 @@ pub struct Star<S> {
     pub open: [S; 3],
     /// Solver step over the inductance.
     pub dt_per_inductance: [S; 3],
+}
+
+/// Coefficients with a share of the flux: apart, so that a step that needs none does not wait for the share.
+struct Weakened<S> {
+    k: [S; 3],
+    share: S,
+}
+
+impl<S: Scalar> Kernel for Weakened<S> {
+    type Output = [S; 3];
+    #[inline(always)]
+    fn run(self) -> [S; 3] {
+        three!(|j| self.share * self.k[j])
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -360,8 +365,7 @@ impl<S: Scalar> Star<S> {
         if !self.saturates(torque) {
             return k;
         }
-        let share = self.unsaturated(torque);
-        three!(|j| share * k[j])
+        apart::<S, _>(Weakened { k, share: self.unsaturated(torque) })
     }
 }
 

@@ -11,7 +11,7 @@ use super::structure::Structure;
 use crate::actuator::servo::advance::{Instant, Stepper};
 use crate::actuator::servo::layout::DriveKind;
 use crate::inverter::hysteresis::ripple_square;
-use crate::scalar::{three_phase, Scalar};
+use crate::scalar::{apart, three_phase, Kernel, Scalar};
 use crate::sensor::filter::low_pass;
 use crate::three;
 
@@ -185,6 +185,38 @@ fn without_gates<S: Scalar>(
 
 #[inline(always)]
 fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: &Instant<S>, s: &mut State<S>) {
+    if !EXTRA && m.star.saturates(m.healthy.torque_constant * s.current) {
+        // Of a copy: a state whose address goes elsewhere does not stay in registers.
+        *s = apart::<S, _>(Saturated::<S, FULL> { m, structure, x, s: *s });
+        return;
+    }
+    step_with::<S, FULL, EXTRA, false>(m, structure, x, s);
+}
+
+/// A step whose current saturates the flux, apart from those of most steps.
+struct Saturated<'a, S, const FULL: bool> {
+    m: &'a Model<S>,
+    structure: &'a Structure,
+    x: &'a Instant<S>,
+    s: State<S>,
+}
+
+impl<S: Scalar, const FULL: bool> Kernel for Saturated<'_, S, FULL> {
+    type Output = State<S>;
+    #[inline(always)]
+    fn run(mut self) -> State<S> {
+        step_with::<S, FULL, false, true>(self.m, self.structure, self.x, &mut self.s);
+        self.s
+    }
+}
+
+#[inline(always)]
+fn step_with<S: Scalar, const FULL: bool, const EXTRA: bool, const SATURATED: bool>(
+    m: &Model<S>,
+    structure: &Structure,
+    x: &Instant<S>,
+    s: &mut State<S>,
+) {
     // Sensors and control electronics.
     let reading = m.sensing.shaft::<FULL>(&structure.sensing, &s.shaft, &mut s.sensed);
     if FULL && structure.sensing.counting {
@@ -203,7 +235,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
     };
     let weakened;
     let torque = p.torque_constant * s.current;
-    let p = if m.star.saturates(torque) {
+    let p = if SATURATED || EXTRA && m.star.saturates(torque) {
         weakened = p.weakened(m.star.unsaturated(torque), &m.control, m.shaft.inertia);
         &weakened
     } else {
