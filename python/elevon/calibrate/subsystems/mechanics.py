@@ -38,6 +38,7 @@ SHARE = 0.5
 DISAGREE = 3.0  # deviations between two groups of logs that are said
 #: Terms beyond the four: what else the residual is tried for.
 EXTRAS = ("load_loss", "stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
+BRAKING = 0.1  # of the samples, that must brake for a loss that grows with the effort. ASSUMED
 DRAWN = 500  # samples of a log on the page
 SEEN = 4.0  # deviations from which a further term is reported, ...
 WORTH = 0.01  # ... and the share of the residual's variance that it explains
@@ -358,7 +359,7 @@ def _extras(
     top = max(float(np.abs(item.speed).max()) for item in rows)
     for name in EXTRAS:
         columns = [c for item in rows if (c := _extra(name, item, top)) is not None]
-        if len(columns) < len(rows):
+        if len(columns) < len(rows) or (name == "load_loss" and not _brakes(rows)):
             continue
         design = [
             np.column_stack([_chosen(item, names), column])
@@ -376,6 +377,12 @@ def _extras(
             texts.append(f"{name}: {size} explains {100 * less:.0f} % of what is left")
             moved.append(tried.value[: len(names)])
     return result, texts, moved
+
+
+def _brakes(rows: Sequence[InverseRows]) -> bool:
+    """Return whether the effort also brakes: else a loss that grows with it is the effort."""
+    against = np.concatenate([item.effort * np.sign(item.speed) < 0.0 for item in rows])
+    return bool(np.mean(against) > BRAKING)
 
 
 def _extra(name: str, rows: InverseRows, top: float) -> Floats | None:
