@@ -31,6 +31,7 @@ MOVING = 0.9  # of a filter's weight that must stem from samples in motion
 #: Of a regressor's variance that the noiseless motion must explain. ASSUMED: with half of it, a
 #: square command made an inertia that is half too large
 INSTRUMENT = 0.9
+OWN_INSTRUMENT = 0.5  # the same of the model's own motion, which has the effort's shape. ASSUMED
 HAUSMAN = 2.0  # deviations between both estimates from which least squares counts as biased
 #: Of a number: a deviation beyond which it is not determined. ASSUMED: at half the number the
 #: interval of 90 % just leaves out zero
@@ -62,6 +63,8 @@ class InverseRows:
         As logged.
     period : float
         s.
+    commanded : bool
+        Whether the instrument was commanded; else it is the model's own motion.
     """
 
     name: str
@@ -73,6 +76,7 @@ class InverseRows:
     instrument: Floats | None
     load: Floats | None
     period: float
+    commanded: bool = True
 
     @property
     def strokes(self) -> tuple[Floats, Floats, float]:
@@ -163,6 +167,7 @@ def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> Inve
     return InverseRows(
         drive.name, time, table[:, 1], table[:, 5], table[:, 4], table[:, :4], instrument,
         table[:, -1] if load is not None else None, drive.period * count,
+        drive.model_speed is None,
     )  # fmt: skip
 
 
@@ -247,7 +252,8 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     # An effort that is held between samples is late by half a period; one that is a mean is not.
     choices.append(regression.value + 0.5 * (late[1] - late[0]))
     extras, seen, moved = _extras(rows, regression)
-    regression = regression.open_to([*choices, *moved])
+    # In one direction further terms are the four's own sums: they say nothing of the four.
+    regression = regression.open_to([*choices, *moved] if "coulomb" in names else choices)
     separate = _separate(rows, names, method)
     regression, findings = _between(regression, separate)
     return Mechanics(
@@ -290,7 +296,8 @@ def _regression(
     left = np.var(stack - through, axis=0)
     strength = 1.0 - left / np.maximum(np.var(stack, axis=0), 1e-300)
     moving = [k for k, name in enumerate(names) if name != "offset"]
-    if method is None and not np.all(strength[moving] > INSTRUMENT):
+    needed = INSTRUMENT if all(item.commanded for item in rows) else OWN_INSTRUMENT
+    if method is None and not np.all(strength[moving] > needed):
         return plain, "least squares", None
     scale = np.maximum(np.linalg.norm(through, axis=0), 1e-300)
     value = np.linalg.lstsq(through / scale, target, rcond=None)[0] / scale
