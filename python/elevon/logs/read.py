@@ -18,7 +18,7 @@ from elevon.logs.formats.frames import Source, table_of
 from elevon.logs.formats.table import RawTable
 from elevon.logs.importing import ImportedLog, find_sidecars, import_table, same_rate, saved_log
 from elevon.logs.log import Log
-from elevon.logs.maps.column_map import ColumnMap, find_map
+from elevon.logs.maps.column_map import ColumnMap, find_map, looks_like_drive
 from elevon.logs.maps.guess import Guess, guess_map, guess_text
 from elevon.logs.report import ImportReport
 from elevon.option import Option
@@ -340,7 +340,8 @@ def _by_headers(
         try:
             plain = read(None)
         except FormatError:
-            plain = None
+            if looks_like_drive(table):
+                raise  # the columns are known by the drive's own numbers: the file is at fault
         if plain is not None and _says_enough(plain):
             return ForeignLog(plain)
     guess = guess_map(table, drive=answers.drive, answers=answers.roles)
