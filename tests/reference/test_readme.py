@@ -31,7 +31,7 @@ LONG = (
     "response nasa-ballscrew",
     "reproduce pisa-",
     "studies prognosis",
-    "studies foreign",
+    "studies lives",
 )
 """These take ten seconds and more; the short ones run with every `make test`, once."""
 
