@@ -49,7 +49,7 @@ def press(*_arguments, **_options):
 HALF = {
     "design": ("elevon.bench.spring.design_spring", ["design", "spring", "--json"]),
     "import": (
-        "elevon.logs.importing.import_log",
+        "elevon.logs.read.imported_log",
         ["import", "LOG", "--out", "OUT/r.parquet", "--json"],
     ),
     "saving": (

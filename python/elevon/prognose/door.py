@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 #: Inspections as the filters take them, or the use at each diagnosis and the diagnosis.
 _Seen = Sequence[tuple[float, Diagnosis]] | Sequence[Inspection | tuple[float, Diagnosis]]
 GrowthLike = FleetGrowth | str | os.PathLike[str]
-Limit = Annotated[str, Option(metavar="VALUE[unit]")]
+Limit = Annotated[str, Option(metavar="QUANTITY")]
 Bias = Annotated[float, Option(min=0.0)]
 Covariates = Annotated[Sequence[str], Option(metavar="NAME=VALUE")]
 Risk = Annotated[float, Option(metavar="P")]

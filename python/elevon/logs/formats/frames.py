@@ -15,7 +15,7 @@ from elevon.logs.formats.table import DEFAULT_LIMITS, RawTable, split_unit, uniq
 
 
 @runtime_checkable
-class Frame(Protocol):
+class DataTable(Protocol):
     """A table of another library: named columns, each of which becomes an array."""
 
     def __getitem__(self, name: str, /) -> npt.ArrayLike:
@@ -26,7 +26,7 @@ class Frame(Protocol):
 
 
 #: A file, or columns in memory.
-Source = str | os.PathLike[str] | Mapping[str, npt.ArrayLike] | Frame
+Source = str | os.PathLike[str] | Mapping[str, npt.ArrayLike] | DataTable
 
 
 def table_of(given: object) -> RawTable:
