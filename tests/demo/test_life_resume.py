@@ -47,6 +47,8 @@ class Answer(SimpleNamespace):
             false_alarm=0.01,
             p_fault=0.1,
             findings=(),
+            would_be_seen={},
+            severity_units={},
             severity=severity,
         )
 
