@@ -284,10 +284,14 @@ def test_logs_that_cannot_be_diagnosed(unit, logs, tmp_path):
 
 def test_a_log_without_measured_current_tells_what_is_left(unit, logs, tmp_path):
     column = logs["backlash"].read_text().splitlines()[0].split(",").index("Drive_axis_1.r78")
-    without = _edited(
-        logs["backlash"], tmp_path / NAME, lambda rows: [r[:column] + r[column + 1 :] for r in rows]
-    )
-    result = answer(unit, without, faults=FEW)
+    without, base = (
+        _edited(
+            logs[name], tmp_path / name / NAME,
+            lambda rows: [r[:column] + r[column + 1 :] for r in rows],
+        )
+        for name in ("backlash", "base")
+    )  # fmt: skip
+    result = answer(unit, without, base, faults=FEW)
     assert result.best == ("backlash@transmission",)
     assert any("r78" in text for text in result.findings)
 

@@ -344,7 +344,7 @@ def test_the_command_line(screw, tmp_path, capsys):
     page = (tmp_path / "page.html").read_text()
     assert "Signals against the healthy model" in page
     assert "backlash@transmission" in page.partition("What these logs can tell")[2]
-    assert '"status": "healthy"' in capsys.readouterr().out
+    assert '"status": "undecided"' in capsys.readouterr().out
     options = ["--actuator", "nasa-ballscrew", "--method", "surrogate"]
     assert main(["diagnose", str(path), *options]) == 2
     assert "--method; give --model MODEL" in capsys.readouterr().err
