@@ -38,7 +38,7 @@ variables! {
         FullScale => "current.full_scale", "-", "A", Positive, Sensor, Some(40.0), "largest current the quantised sensor reports",
             high_only("single phase currents are quantised, not its one").when(&[Away("sensor.current.bits", 0.0)]);
         Bandwidth => "current.bandwidth", "-", "Hz", NonNegative, Sensor, Some(0.0), "first-order filter of the current that the drive controls; 0: none",
-            when(&[In(Fidelity::Low, &[Chosen("drive.kind", &["hysteresis"]), Chosen("thermal.model", &["quasi_static", "dynamic"])])]);
+            when(&[In(Fidelity::Low, &[Chosen("drive.kind", &["hysteresis"])])]);
         FilterCutoff => "filter_cutoff", "f_c", "Hz", Positive, Sensor, Some(100.0), "cut-off of the first-order filters of the logged d and q quantities";
     }
 }
