@@ -173,7 +173,7 @@ mod tests {
                 deepest = deepest.max(x - 1.0);
             }
             let (zeta, omega) = (damping / (2.0 * 40.0), 20.0_f64);
-            let turn = (1.0 - zeta * zeta as f64).sqrt();
+            let turn = (1.0 - zeta * zeta).sqrt();
             // The damper lets go where its pull would pass the spring's push: tan(t) = 2 zeta turn / (1 - 2 zeta^2) before the end.
             let ends = std::f64::consts::PI - (2.0 * zeta * turn).atan2(1.0 - 2.0 * zeta * zeta);
             let angle = ends / turn;
