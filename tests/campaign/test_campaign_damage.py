@@ -1,5 +1,6 @@
 """Damage to a campaign is seen, and mended where it can be."""
 
+import pyarrow.parquet as pq
 import pytest
 
 import elevon
@@ -75,12 +76,23 @@ def test_a_damaged_table_of_a_finished_campaign_is_mended(plan, cli, tmp_path, n
     assert (out / name).read_bytes() == good
 
 
-def test_a_damaged_table_and_a_damaged_block(plan, cli, tmp_path):
-    """What its own table of ends does not tell is simulated, nothing else."""
+@pytest.mark.parametrize("place", ["page", "statistics"])
+def test_a_damaged_table_and_a_damaged_block(place, plan, cli, tmp_path):
+    """A block that is not the one that the manifest states is simulated, nothing else.
+
+    No checksum of a page covers the statistics: a flipped minimum leaves a file that reads well.
+    """
     path, out = plan(6, head="runs_per_file = 2"), tmp_path / "out"
     cli("campaign", "run", path, "--out", out)
-    for name in ("runs.parquet", "ends/block_00001.parquet"):
-        flip(out / name, (out / name).stat().st_size // 2)
+    flip(out / "runs.parquet", (out / "runs.parquet").stat().st_size // 2)
+    block = out / "ends" / "block_00001.parquet"
+    column = pq.ParquetFile(block).metadata.row_group(0).column(0)
+    if place == "page":
+        flip(block, column.data_page_offset + column.total_compressed_size - 1)
+    else:
+        least = column.statistics.min.to_bytes(8, "little")
+        flip(block, block.read_bytes().rindex(least))
+        assert pq.read_table(block).num_rows == 2
     code, report, _ = cli("campaign", "run", path, "--out", out)
     assert (code, report["skipped"]) == (0, 4)
     assert cli("dataset", "verify", out)[0] == 0

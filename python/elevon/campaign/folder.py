@@ -290,21 +290,26 @@ def _find_blocks(folder: Path, resolved: Resolved, manifest: Manifest) -> Campai
 
 
 def whole_blocks(folder: Path, manifest: Manifest) -> tuple[dict[str, Item], list[str]]:
-    """Return the blocks that are whole, and the names of those that only they themselves prove."""
+    """Return the blocks that are whole, and the names of those that only they themselves prove.
+
+    A block whose SHA-256 the log or the manifest states is whole only if it is that block:
+    checksums of pages, by which a block proves itself, do not cover the statistics of a file.
+    """
     try:
         log = work_log(folder, manifest)
     except FormatError:
         log = None  # each block says itself what it is
     before = {} if log is None else log.items
     earlier = _finished_blocks(folder, manifest)
+    stated = {*before, *(block["name"] for block in manifest.blocks)}
     items, recovered = {}, []
     for block, (first, stop) in enumerate(itertools.pairwise(manifest.edges)):
         name = block_name(block)
         item = before.get(name) or earlier.get(name)
-        if item is None or not item.intact(folder):
+        if item is None and name not in stated:
             item = _proved_by_itself(folder, manifest, name, (first, stop - 1))
             recovered += [] if item is None else [name]
-        if item is not None:
+        if item is not None and item.intact(folder):
             items[name] = item
     return items, recovered
 
