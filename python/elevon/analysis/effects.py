@@ -12,13 +12,12 @@ import numpy.typing as npt
 
 from elevon.analysis.response import CampaignResponse
 from elevon.arrays import Floats
-from elevon.data import packaged_toml
 from elevon.errors import InputError
 from elevon.plain import STORED, Plain
-from elevon.report import Report
-from elevon.report.described import described
+from elevon.report import Report, ReportTable, Section
 from elevon.report.figures import COLOURS, new_figure
 from elevon.results import Result
+from elevon.units import display_unit, to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -438,13 +437,58 @@ _METHODS = {
 
 def effects_report(effects: Effects, folder: str, *, date: str | None = None) -> Report:
     """Return the report of a campaign's effects on a response."""
-    names = {"effects": effects, "methods": _METHODS, "equal_repeats": EQUAL_REPEATS,
-             "pareto": pareto, "half_normal": half_normal}  # fmt: skip
-    report = described(packaged_toml("elevon.analysis", "effects.toml"), names, date=date)
+    report = Report(
+        f"Effects on {effects.response}",
+        f"Change of the response [{effects.unit}] from the lowest to the highest level of each "
+        f"factor. Intervals at {100 * effects.level:g} % for each term by itself: "
+        f"{_METHODS[effects.method]}.",
+        date=date,
+    )
+    report.fact("Runs", str(effects.runs), f"{len(effects.left_out)} left out")
+    report.fact("Mean", f"{effects.mean:.4g} {effects.unit}")
+    section = report.section("Effects").table(_terms(effects.terms))
+    _notes(section, effects)
+    section.figure(pareto(effects), "Pareto chart; the line is the margin of the interval.")
+    section.figure(half_normal(effects), "Half-normal plot; effects of noise alone lie on a line.")
+    report.section("Factors").table(_factors(effects.factors))
     report.provenance(
         {"Command": f"elevon campaign effects {folder} --response {effects.response}"}
     )
     return report
+
+
+def _terms(terms: Sequence[EffectEstimate]) -> ReportTable:
+    """Return the table of the effects with their intervals."""
+    rows = [
+        [term.term, term.name, term.effect,
+         *("not known" if end is None else end for end in (term.low, term.high)),
+         ", ".join(term.aliases)]
+        for term in terms
+    ]  # fmt: skip
+    return ReportTable(["Term", "Factors", "Effect", "Low", "High", "Aliased with"], rows)
+
+
+def _notes(section: Section, effects: Effects) -> None:
+    """Add what the design could not tell apart."""
+    if effects.blocked:
+        section.text(f"Confounded with the blocks: {', '.join(effects.blocked)}.")
+    if effects.equal_repeats:
+        section.text(f"Note: {EQUAL_REPEATS}.")
+    if effects.partial:
+        left_out = ", ".join(effects.partial)
+        section.text(f"Left out, partly aliased with other terms: {left_out}.")
+    if effects.with_blocks:
+        section.text(f"Varied with the blocks: {', '.join(effects.with_blocks)}.")
+
+
+def _factors(factors: Sequence[dict[str, Any]]) -> ReportTable:
+    """Return the table of the factors and their levels in units that a person reads."""
+    rows = []
+    for factor in factors:
+        unit = display_unit(factor["unit"])
+        ends = (to_display(factor[end], unit) for end in ("low", "high"))
+        rows.append([factor["letter"], factor["name"], *ends, unit])
+    return ReportTable(["Letter", "Factor", "Low", "High", "Unit"], rows)
 
 
 def pareto(effects: Effects, most: int = 25) -> Figure:

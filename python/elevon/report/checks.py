@@ -49,6 +49,22 @@ class Check(Plain):
             return False
         return self.value >= self.limit if self.at_least else self.value <= self.limit
 
+    @property
+    def word(self) -> str:
+        """``pass`` or ``fail``."""
+        return "pass" if self.passed else "fail"
+
+    @property
+    def digits(self) -> str:
+        """The value as a table shows it."""
+        return f"{self.value:.5g}"
+
+    @property
+    def bound(self) -> str:
+        """The limit as a table shows it, with the side on which the value has to be."""
+        side = "\N{GREATER-THAN OR EQUAL TO}" if self.at_least else "\N{LESS-THAN OR EQUAL TO}"
+        return f"{side} {self.limit:.5g}"
+
 
 def all_passed(checks: Iterable[Check]) -> bool:
     """Tell whether there is at least one check and none failed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from html import unescape
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SHOWN_ROWS = 20
+_LONG = 60  # characters from which a cell is set in a wide column
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,21 @@ class ReportTable:
         if self.folded or len(self.rows) <= _SHOWN_ROWS:
             return self.folded
         return f"Table of {len(self.rows)} rows: {', '.join(map(str, self.columns[:4]))} ..."
+
+    def headings(self) -> list[tuple[str, str]]:
+        """Return each column's class in the page, ``number`` or none, and its heading."""
+        return [("number" if self.numeric(n) else "", name) for n, name in enumerate(self.columns)]
+
+    def body(self) -> Iterator[tuple[bool, list[tuple[str, str, str]]]]:
+        """Yield whether each row is marked, and its cells: heading, class in the page, text."""
+        headings = self.headings()
+        for index, row in enumerate(self.rows):
+            texts = [self.cell(value, column) for column, value in enumerate(row)]
+            cells = [
+                (name, kind or ("long" if len(text) > _LONG else ""), text)
+                for (kind, name), text in zip(headings, texts, strict=True)
+            ]
+            yield index in self.marked, cells
 
     def numeric(self, column: int) -> bool:
         """Tell whether a column holds numbers only, to be set to the right."""
@@ -247,6 +263,11 @@ class Report:
         if not self.checks:
             return None
         return "pass" if all_passed(self.checks) else "fail"
+
+    @property
+    def tally(self) -> str:
+        """How many checks pass, of how many."""
+        return f"{sum(check.passed for check in self.checks)} of {len(self.checks)}"
 
     @property
     def folds(self) -> bool:

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.data import packaged_toml
 from elevon.recording import Recording
 from elevon.recording.plot import code_names
-from elevon.report import Report, provenance
-from elevon.report.described import described
+from elevon.report import Report, ReportTable, Section, provenance
 from elevon.report.figures import new_figure
 from elevon.safety.campaign import HazardRow, SafetyResult, per_hour
 from elevon.safety.hazards import HAZARDS, RECORD
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LISTED = (
+    "Listed: no sensor could tell, with the reason below. Per hour: the sum over the combinations "
+    "of the products of their failures' rates, an upper bound."
+)
 
 
 def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None = None) -> Report:
@@ -31,42 +36,60 @@ def safety_report(result: SafetyResult, actuator: Actuator, *, date: str | None 
     date : str, optional
         Printed instead of the day's.
     """
-    names = {
-        "result": result,
-        "actuator": actuator,
-        "texts": {item.name: item.text for item in HAZARDS},
-        "combinations": _combinations,
-        "worst": partial(_worst, actuator),
-    }
-    report = described(packaged_toml("elevon.safety", "page.toml"), names, date=date)
+    report = Report(
+        f"Safety of {actuator.name}",
+        f"{result.runs} situations with up to three failures, {result.repeated} of them again at "
+        f"high fidelity. {result.unsafe} show a hazard.",
+        date=date,
+    )
+    alone = sum(item.single for item in result.hazards if item.severe)
+    report.fact("Situations", str(result.runs), "at low fidelity")
+    report.fact("With a hazard", str(result.unsafe), "listed or not")
+    report.fact("Severe by one failure", str(alone), "must be none")
+    report.section("Hazards").table(_hazards(result))
+    for item in result.hazards:
+        if item.findings:
+            title = item.name[:1].upper() + item.name[1:]
+            _hazard(report.section(title), item.findings, actuator)
+    run = ReportTable(["Group", "Rows"], list(result.groups.items()))
+    report.section("What was run").table(run)
     report.section("Checks").checks(result.checks)
     command = f"elevon safety {actuator.name} --seed {result.seed} --out DIR"
     report.provenance(provenance(command, Seed=result.seed))
     return report
 
 
-def _combinations(findings: tuple[HazardRow, ...]) -> list[list[object]]:
-    """Return a hazard's combinations: rows, probability an hour, why no sensor could tell."""
-    rows = Counter(item.row.combination for item in findings)
+def _hazards(result: SafetyResult) -> ReportTable:
+    """Return the table of all hazards."""
+    texts = {item.name: item.text for item in HAZARDS}
+    rows = [
+        [item.name, texts[item.name], len(item.findings), item.listed, item.single,
+         item.per_hour or None]
+        for item in result.hazards
+    ]  # fmt: skip
+    columns = ["Hazard", "What it is", "Rows", "Listed", "By one failure", "Per hour"]
+    return ReportTable(columns, rows, _LISTED, formats=[""] * 5 + [".1e"])
+
+
+def _hazard(section: Section, findings: tuple[HazardRow, ...], actuator: Actuator) -> None:
+    """Add a hazard's combinations, its worst row's timeline, and what the crew sees of that."""
+    counts = Counter(item.row.combination for item in findings)
     combinations = {item.row.combination: item for item in findings}
-    return [
-        [key, rows[key], per_hour(item.row), item.reason or "not listed"]
+    rows = [
+        [key, counts[key], per_hour(item.row), item.reason or "not listed"]
         for key, item in combinations.items()
     ]
-
-
-def _worst(actuator: Actuator, findings: tuple[HazardRow, ...]) -> dict[str, object]:
-    """Return a hazard's worst row: its timeline, and what the crew sees."""
+    columns = ["Failures", "Rows", "Per hour", "Why no sensor could tell"]
+    section.table(ReportTable(columns, rows, formats=["", "", ".1e", ""]))
     unlisted = [item for item in findings if not item.reason]
-    chosen = min(unlisted or findings, key=lambda item: len(item.row.faults))
-    recording = _again(actuator, chosen)
-    return {
-        "row": chosen.row,
-        "fidelity": chosen.fidelity,
-        "time": chosen.time,
-        "figure": _timeline(recording, chosen, actuator.wiring),
-        "messages": _messages(recording, actuator.wiring),
-    }
+    worst = min(unlisted or findings, key=lambda item: len(item.row.faults))
+    recording = _again(actuator, worst)
+    section.figure(
+        _timeline(recording, worst, actuator.wiring),
+        f"{worst.row.combination}. {worst.row.situation}. {worst.fidelity.capitalize()} fidelity; "
+        f"the hazard begins at the dotted line, {worst.time:.2f} s.",
+    )
+    section.text("What the crew sees:").points(_messages(recording, actuator.wiring))
 
 
 def _again(actuator: Actuator, finding: HazardRow) -> Recording:
@@ -75,7 +98,7 @@ def _again(actuator: Actuator, finding: HazardRow) -> Recording:
     return simulate(actuator, finding.row.scenario(), fidelity=finding.fidelity, record=[RECORD])
 
 
-def _timeline(recording: Recording, finding: HazardRow, wiring: str) -> Any:
+def _timeline(recording: Recording, finding: HazardRow, wiring: str) -> Figure:
     """Ram, state displayed and true lock over time; only states that occur have a line."""
     time, states = recording["state"].time, recording["state"].values
     occurring = sorted({int(value) for value in states})
