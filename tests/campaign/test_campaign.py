@@ -7,13 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import elevon
 from elevon.campaign import check as check_module
-from elevon.campaign import load_plan, load_run, read_manifest, resolve_plan
+from elevon.campaign import execute, load_plan, load_run, read_manifest, resolve_plan
 from elevon.cli import main
 from elevon.errors import FormatError, InputError
 
@@ -340,3 +341,43 @@ def test_refused_before_anything_is_written(write, tmp_path, capsys, name):
     with pytest.raises(InputError, match=message):
         raise InputError(captured.err)
     assert not (tmp_path / "out").exists()
+
+
+def test_two_campaigns_of_one_plan_are_equal_to_the_byte(plan, cli, tmp_path):
+    """Times, threads and the folder's name stand in the journal alone, and nothing reads it."""
+    path = plan(6, tail="[split]\nfit = 0.5\ncheck = 0.5")
+    folders = [tmp_path / "one", tmp_path / "another" / "two"]
+    for folder, threads in zip(folders, ("1", "2"), strict=True):
+        assert cli("campaign", "run", path, "--out", folder, "--threads", threads)[0] == 0
+    held = [
+        {f.relative_to(folder): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
+        for folder in folders
+    ]
+    logs = [files.pop(Path("campaign.log")) for files in held]
+    assert held[0] == held[1]
+    assert str(folders[1]).encode() in logs[1]
+    (folders[0] / "campaign.log").write_bytes(b"\xff nonsense")
+    assert cli("campaign", "run", path, "--out", folders[0])[1]["skipped"] == 6
+    (folders[0] / "campaign.log").unlink()
+    assert cli("dataset", "verify", folders[0])[0] == 0
+
+
+def test_the_end_sweeps_seals_and_verifies(plan, cli, tmp_path, monkeypatch):
+    """What a killed worker left is removed; a file that nothing lists makes exit 1."""
+    path, out = plan(6), tmp_path / "out"
+    real = execute.finish
+
+    def finish(work):
+        outcome = real(work)
+        (out / "ends" / ".block_00000.0123456789ab.part.parquet").write_bytes(b"half")
+        return outcome
+
+    monkeypatch.setattr(execute, "finish", finish)
+    assert cli("campaign", "run", path, "--out", out)[0] == 0
+    assert not list(out.rglob("*.part.parquet"))
+    assert cli("dataset", "verify", out)[0] == 0
+    (out / "ends" / "stray.parquet").write_bytes(b"a stranger")
+    code, report, err = cli("campaign", "run", path, "--out", out)
+    assert (code, report) == (1, None)
+    assert "is finished, but not whole: files that the manifest does not list" in err
+    assert "stray.parquet" in err

@@ -108,6 +108,44 @@ def test_no_workers_are_reported_and_a_lost_scheduler_ends_the_wait(plan, tmp_pa
             process.wait()
 
 
+@pytest.mark.long
+def test_a_frozen_worker_is_named_and_its_blocks_are_given_to_others(plan, cli, tmp_path):
+    """Two workers, one halted as soon as it writes: the other does its blocks, exit 0."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    address, out, err = f"tcp://127.0.0.1:{port}", tmp_path / "out", tmp_path / "stderr"
+    scheduler = ["dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    worker = ["dask_worker", address, "--no-nanny", "--nthreads", "1", "--no-dashboard"]
+    started = []
+
+    def start(words, stream=subprocess.DEVNULL):
+        started.append(subprocess.Popen([sys.executable, "-m", *words], stderr=stream,
+                                        stdout=subprocess.DEVNULL))  # fmt: skip
+        return started[-1]
+
+    try:
+        start([f"distributed.cli.{scheduler[0]}", *scheduler[1:]])
+        _answering(address)
+        workers = [start([f"distributed.cli.{worker[0]}", *worker[1:]]) for _ in range(2)]
+        path = plan(48, head="runs_per_file = 1")
+        text = path.read_text().replace('"10 ms"', '"2 s"').replace('"low"', '"high"')
+        path.write_text(text)
+        words = ["campaign", "run", path, "--out", out, "--scheduler", address]
+        with err.open("w") as stream:
+            run = start(["elevon", *map(str, words), "--silent-after", "2 s"], stream)
+            _until(lambda: len(list(out.glob("ends/*.parquet"))) > 2, 120.0)
+            workers[0].send_signal(signal.SIGSTOP)
+            assert run.wait(240.0) == 0, err.read_text()
+        assert "has given no sign for" in err.read_text()
+        assert "are given to others" in err.read_text()
+        assert cli("dataset", "verify", out)[0] == 0
+        assert cli("campaign", "status", out)[1]["counts"] == {"ok": 48}
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
 def _answering(address):
     def there():
         try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from importlib.resources import files
@@ -250,7 +249,7 @@ def _cell(cell: object) -> str:
 def _code(ds: Dataset) -> str:
     return (
         "import elevon\n\n"
-        f"ds = elevon.load_campaign({json.dumps(ds.folder.name)})\n"
+        'ds = elevon.load_campaign(".")  # from within this folder, or its path\n'
         "runs = ds.runs.to_pandas()       # one row a run: faults in SI, 0 when absent\n"
         + (
             "signals = ds.signals.to_pandas(runs=[0])"

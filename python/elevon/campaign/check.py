@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -231,14 +231,12 @@ class Cost:
     checked: Checked | None = None
 
     @classmethod
-    def of(cls, work: CampaignWork) -> Cost:
-        """Return what is still to be done of a campaign."""
-        about, total = work.manifest.estimate, len(work.resolved)
-        runs = sum(len(work.numbers(block)) for block in work.missing)
-        part = runs / total
-        disk, seconds = int(about["disk"] * part), about["seconds"] * part
-        memory = int(about["memory"])
-        return cls(runs, len(work.missing), work.edges, disk, memory, seconds)
+    def of(cls, work: CampaignWork, threads: int) -> Cost:
+        """Return what is still to be done of a campaign, on so many threads or workers."""
+        runs = [number for block in work.missing for number in work.numbers(block)]
+        disk, memory = work.missing_bytes, int(work.manifest.estimate["memory"])
+        seconds = _pilot_seconds(work.resolved, runs, threads)
+        return cls(len(runs), len(work.missing), work.edges, disk, memory, seconds)
 
     def to_dict(self) -> dict[str, float]:
         """Return the JSON form."""
@@ -264,7 +262,7 @@ def estimate(resolved: Resolved, checked: Checked, folder: Path, threads: int) -
     memory = check_memory(checked, edges)
     disk = int(checked.sizes.sum())
     check_disk(folder, disk)
-    seconds = _estimate_seconds(resolved, checked, threads)
+    seconds = _pilot_seconds(resolved, range(len(resolved)), threads, checked.steps)
     return Cost(len(resolved), len(edges) - 1, edges, disk, memory, seconds, checked)
 
 
@@ -279,19 +277,39 @@ def check_disk(folder: Path, need: int) -> None:
         )
 
 
-def _estimate_seconds(resolved: Resolved, checked: Checked, threads: int) -> float:
-    """Extrapolate from the first milliseconds of some runs, spread over the plan."""
+def _pilot_seconds(
+    resolved: Resolved,
+    numbers: Sequence[int],
+    threads: int,
+    steps: npt.ArrayLike | None = None,
+) -> float:
+    """Extrapolate the seconds of some runs from the first milliseconds of a few of them.
+
+    Parameters
+    ----------
+    resolved : Resolved
+        The plan.
+    numbers : sequence of int
+        The runs.
+    threads : int
+        That carry them out.
+    steps : ndarray, shape (runs,), optional
+        Solver steps of each; without, those of the few stand for all.
+    """
     import time
 
-    count = min(_PILOT_RUNS, len(resolved))
-    chosen = np.linspace(0, len(resolved) - 1, count).astype(int)
-    pilots = [_pilot_run(resolved.prepared(int(number))) for number in chosen]
+    if not len(numbers):
+        return 0.0
+    chosen = np.linspace(0, len(numbers) - 1, min(_PILOT_RUNS, len(numbers))).astype(int)
+    prepared = [resolved.prepared(int(numbers[at])) for at in chosen]
+    pilots = [_pilot_run(item) for item in prepared]
     start = time.perf_counter()
     results = simulate_prepared(pilots, fidelity=resolved.fidelity, threads=1)
     spent = time.perf_counter() - start
-    steps = max(sum(int(result["steps"]) for result in results), 1)
-    work = float(checked.steps.sum()) * spent / steps + _RUN_SECONDS * len(resolved)
-    return work / min(threads, checked_threads(None))
+    if steps is None:
+        steps = len(numbers) * np.mean([item.core["duration"] / item.step for item in prepared])
+    march = float(np.sum(steps)) * spent / max(sum(int(item["steps"]) for item in results), 1)
+    return (march + _RUN_SECONDS * len(numbers)) / min(threads, checked_threads(None))
 
 
 def _pilot_run(prepared: Any) -> Any:

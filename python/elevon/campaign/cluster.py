@@ -10,7 +10,7 @@ import logging
 import re
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from importlib import import_module
@@ -102,13 +102,16 @@ _AHEAD = 3
 _MOMENT = 1.0
 #: Seconds between two looks at the blocks given out.
 _PAUSE = 0.02
+#: What the library raises for a result that nobody can bring.
+_GONE = frozenset({"CommClosedError", "FutureCancelledError", "CancelledError"})
 
 
 def in_cluster(
     work: CampaignWork,
     address: str,
     progress: Callable[[float], object] | None,
-    announce: Callable[[str], object] | None = None,
+    announce: Callable[[str], object] | None,
+    silent_after: float,
 ) -> None:
     """Have the missing blocks of a campaign done by a cluster.
 
@@ -121,14 +124,17 @@ def in_cluster(
     progress : callable, optional
         Called with the done fraction after each block; returning False interrupts.
     announce : callable, optional
-        Called with a line when there are no workers.
+        Called with a line when there are no workers, or when one is silent.
+    silent_after : float
+        Seconds after which a worker that gives no sign is named with its blocks; after as many
+        again its blocks are given to others.
 
     Raises
     ------
     InputError
         No such scheduler, or ``distributed`` is not installed.
     OutputError
-        The scheduler no longer answers; what is done is kept.
+        The scheduler no longer answers, or workers end over a block; what is done is kept.
     Interrupted
         `progress` returned False.
     """
@@ -136,50 +142,110 @@ def in_cluster(
         return
     waiting = iter(work.missing)
     with _connect_client(address) as client:
-        workers = _Workers(client, address, announce)
+        workers = _Workers(client, address, announce or (lambda _: None), silent_after)
         slots = _AHEAD * max(workers.count(), 1)
-        pending = {_submit(client, work, block) for block in islice(waiting, slots)}
+        pending = {_submit(client, work, block): block for block in islice(waiting, slots)}
         while pending:
             finished = _await_blocks(pending)
             workers.look(idle=not finished)
             check_there(work.folder)
             for future in finished:
-                work.log.add(_block_result(future, address))
-                pending.discard(future)
-                pending |= {_submit(client, work, block) for block in islice(waiting, 1)}
+                block = pending.pop(future)
+                item = _block_result(future, block, address)
+                if item is None:  # it is done, and the worker that knows how is silent
+                    workers.check_scheduler()
+                    pending[_submit(client, work, block)] = block
+                    continue
+                work.log.add(item)
+                for following in islice(waiting, 1):
+                    pending[_submit(client, work, following)] = following
+            for future, others in workers.take_from_silent(pending):
+                block = pending.pop(future)
+                future.cancel()
+                pending[_submit(client, work, block, others)] = block
             if progress is not None and progress(_done_fraction(work)) is False:
                 raise Interrupted("interrupted between two blocks")
 
 
 class _Workers:
-    """Watches the scheduler: whether it answers, and whether anybody works for it."""
+    """Watches the scheduler, whether it answers, and the workers, whether each gives signs."""
 
-    def __init__(self, client: Client, address: str, announce: Callable[[str], Any] | None) -> None:
-        self._connect_client, self._address, self._announce = client, address, announce
-        self._seen = time.monotonic()
+    def __init__(
+        self, client: Client, address: str, announce: Callable[[str], Any], silent_after: float
+    ) -> None:
+        self._client, self._address, self._announce = client, address, announce
+        self._silent_after = silent_after
+        self._seen = self._looked = time.monotonic()
         self._waits = False
+        #: Of each worker: its last sign by the scheduler's clock, and when this process saw it.
+        self._signs: dict[str, tuple[float, float]] = {}
+        self._named: set[str] = set()
 
     def count(self) -> int:
+        return len(self._about())
+
+    def _about(self) -> dict[str, Any]:
+        """Return what the scheduler knows of each worker."""
         try:
-            about = self._connect_client.scheduler_info()
+            about: dict[str, Any] = self._client.scheduler_info(n_workers=-1)["workers"]
         # The library has a dozen errors for a scheduler that has gone.
         except Exception as error:
-            raise _scheduler_gone(self._address, f": {type(error).__name__}") from error
-        return int(about.get("n_workers", len(about["workers"])))
+            raise _scheduler_gone(self._address) from error
+        return about
 
     def look(self, *, idle: bool) -> None:
         """Raise where the scheduler has gone or is silent; say so where nobody works."""
         if not idle:
             self._seen, self._waits = time.monotonic(), False
             return
-        if self._connect_client.status == "running" and self._greets():
+        if self._client.status == "running" and self._greets():
             self._seen = time.monotonic()
             waits = self.count() == 0
-            if waits and not self._waits and self._announce is not None:
+            if waits and not self._waits:
                 self._announce("waiting for workers (0)")
             self._waits = waits
-        elif self._connect_client.status == "closed" or time.monotonic() - self._seen > LIMIT / 2.0:
+        elif self._client.status == "closed" or time.monotonic() - self._seen > LIMIT / 2.0:
             raise _scheduler_gone(self._address)
+
+    def check_scheduler(self) -> None:
+        """Raise `OutputError` where the scheduler has gone."""
+        if self._client.status != "running" or not self._greets():
+            raise _scheduler_gone(self._address)
+
+    def take_from_silent(self, pending: Mapping[Any, int]) -> list[tuple[Any, list[str]]]:
+        """Name the workers that give no sign; return what is to be given to which others."""
+        now = time.monotonic()
+        if now - self._looked < _MOMENT or not self._greets():
+            return []
+        self._looked = now
+        for name, about in (workers := self._about()).items():
+            if about["last_seen"] != self._signs.get(name, (None, now))[0]:
+                self._signs[name] = (about["last_seen"], now)
+                self._named.discard(name)
+        ages = {name: now - self._signs[name][1] for name in workers}
+        others = [name for name, age in ages.items() if age < self._silent_after]
+        taken = []
+        for name in ages.keys() - others:
+            held = self._held_by(name, pending)
+            blocks = ", ".join(str(pending[future]) for future in held) or "none"
+            if name not in self._named:
+                self._named.add(name)
+                self._announce(
+                    f"worker {name} has given no sign for {ages[name]:.0f} s; its blocks: {blocks}"
+                )
+            if held and others and ages[name] > 2.0 * self._silent_after:
+                self._announce(f"blocks {blocks} of the silent worker {name} are given to others")
+                taken += [(future, others) for future in held]
+        return taken
+
+    def _held_by(self, name: str, pending: Iterable[Any]) -> list[Any]:
+        try:
+            held: Any = self._client.processing  # has no types
+            keys = set(held([name]).get(name, ()))
+        # As above: whatever the library makes of a scheduler that has gone.
+        except Exception as error:
+            raise _scheduler_gone(self._address) from error
+        return [future for future in pending if future.key in keys]
 
     def _greets(self) -> bool:
         """Return whether the scheduler greets who connects: one that is halted keeps the line."""
@@ -192,33 +258,42 @@ class _Workers:
         return True
 
 
-def _await_blocks(pending: set[Any]) -> set[Any]:
+def _await_blocks(pending: Iterable[Any]) -> list[Any]:
     """Wait a moment for blocks that are done, or have failed; there may be none."""
     end = time.monotonic() + _MOMENT
     while time.monotonic() < end:
-        if done := {future for future in pending if future.done()}:
+        if done := [future for future in pending if future.done()]:
             return done
         time.sleep(_PAUSE)
-    return set()
+    return []
 
 
-def _block_result(future: Any, address: str) -> Item:
-    """Return what a worker has made of a block, or its error."""
+def _block_result(future: Any, block: int, address: str) -> Item | None:
+    """Return what a worker has made of a block, or its error; None where nobody answers."""
     try:
         item: Item = future.result(timeout=LIMIT)
     except (ElevonError, KeyboardInterrupt):
         raise
     except MemoryError as error:
         raise OutputError(f"--scheduler {address}: a worker has not enough memory") from error
-    # The library has a dozen errors for a scheduler or a worker that is gone.
     except Exception as error:
-        raise _scheduler_gone(address, f": {type(error).__name__}: {error}") from error
+        kind = type(error).__name__  # the library has a dozen errors for a peer that is gone
+        if isinstance(error, TimeoutError) or kind in _GONE:
+            return None
+        why = (
+            "each worker that was given it ended before it was done (too little memory, or killed)"
+            if kind == "KilledWorker"
+            else f"a worker failed: {kind}: {error}"
+        )
+        raise OutputError(
+            f"--scheduler {address}: block {block}: {why}; what is done is kept"
+        ) from error
     return item
 
 
-def _scheduler_gone(address: str, why: str = "") -> OutputError:
+def _scheduler_gone(address: str) -> OutputError:
     return OutputError(
-        f"--scheduler {address}: no longer answers{why}; what is done is kept: give the command "
+        f"--scheduler {address}: no longer answers; what is done is kept: give the command "
         "again, or elevon campaign resume"
     )
 
@@ -241,11 +316,13 @@ def _read_plan(folder: str) -> Resolved:
     return read_resolved(Path(folder))
 
 
-def _submit(client: Client, work: CampaignWork, block: int) -> Any:
+def _submit(
+    client: Client, work: CampaignWork, block: int, workers: list[str] | None = None
+) -> Any:
     numbers = work.numbers(block)
     folder = str(work.folder.absolute())
     arguments = (folder, work.manifest.core, block, numbers.start, numbers.stop)
-    return client.submit(worker_block, *arguments, pure=False)
+    return client.submit(worker_block, *arguments, pure=False, workers=workers)
 
 
 def _done_fraction(work: CampaignWork) -> float:

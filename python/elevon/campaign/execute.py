@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import socket
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +18,16 @@ from elevon.campaign.check import Cost, check, estimate
 from elevon.campaign.folder import CampaignWork, begin, finish, finished, open_folder
 from elevon.campaign.resolved import Resolved
 from elevon.campaign.resolved_file import read_resolved
-from elevon.campaign.store import LOG, Manifest, read_manifest
-from elevon.errors import InputError
+from elevon.campaign.store import JOURNAL, LOG, Manifest, read_manifest
+from elevon.errors import ElevonError, InputError, OutputError
+from elevon.files import open_owned
 from elevon.simulate.batch import checked_threads
 from elevon.worklog import Item, locked, sweep
 
 Report = Callable[[float], Any]
+
+SILENT_AFTER = 30.0
+"""Seconds without a sign of life of a worker, by default; ASSUMED: sixty heartbeats of Dask."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,7 @@ def run_campaign(
     cluster: str | None = None,
     progress: Report | None = None,
     announce: Callable[[str], object] | None = None,
+    silent_after: float = SILENT_AFTER,
 ) -> CampaignResult:
     """Run a plan into a folder, or go on with one that was interrupted.
 
@@ -89,6 +96,9 @@ def run_campaign(
         Called with the done fraction; returning False interrupts.
     announce : callable, optional
         Called, before anything runs, with what the campaign will take.
+    silent_after : float
+        Seconds after which a worker of a cluster that gives no sign is named with its blocks;
+        after as many again they are given to others.
 
     Returns
     -------
@@ -115,7 +125,13 @@ def run_campaign(
         sweep(folder)
         work = begin(folder, resolved, text, need)
         return _simulate_missing(
-            work, count, cluster=cluster, progress=progress, announce=announce, start=start
+            work,
+            count,
+            cluster=cluster,
+            progress=progress,
+            announce=announce,
+            silent_after=silent_after,
+            start=start,
         )
 
 
@@ -126,6 +142,7 @@ def resume_campaign(
     cluster: str | None = None,
     progress: Report | None = None,
     announce: Callable[[str], object] | None = None,
+    silent_after: float = SILENT_AFTER,
 ) -> CampaignResult:
     """Go on with a campaign from what its folder says; the plan file is not needed.
 
@@ -138,7 +155,13 @@ def resume_campaign(
         sweep(folder)
         work = begin(folder, resolved, None, None)
         return _simulate_missing(
-            work, count, cluster=cluster, progress=progress, announce=announce, start=start
+            work,
+            count,
+            cluster=cluster,
+            progress=progress,
+            announce=announce,
+            silent_after=silent_after,
+            start=start,
         )
 
 
@@ -167,24 +190,55 @@ def _simulate_missing(
     cluster: str | None,
     progress: Report | None,
     announce: Callable[[str], Any] | None,
+    silent_after: float,
     start: float,
 ) -> CampaignResult:
     skipped = work.done_runs
     if announce is not None and work.recovered:
         announce(f"{len(work.recovered)} block(s) found whole that {LOG} does not list")
-    if (outcome := finished(work)) is not None:
-        return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
-    if announce is not None and work.missing:
-        announce(str(Cost.of(work)))
-    work.check_disk()
-    if cluster is None:
-        _simulate_in_threads(work, threads, progress)
-    else:
-        from elevon.campaign.cluster import in_cluster
+    outcome = finished(work)
+    if outcome is None:
+        _note(work.folder, f"begun in {work.folder.absolute()}: {skipped} runs are there")
+        if announce is not None and work.missing:
+            announce(str(Cost.of(work, threads)))
+        work.check_disk()
+        if cluster is None:
+            _simulate_in_threads(work, threads, progress)
+        else:
+            from elevon.campaign.cluster import in_cluster
 
-        in_cluster(work, cluster, progress, announce)
-    outcome = finish(work)
-    return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
+            in_cluster(work, cluster, progress, announce, silent_after)
+        outcome = finish(work)
+    _close(work.folder)
+    result = CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
+    counts = ", ".join(f"{count} {status}" for status, count in result.counts.items())
+    _note(work.folder, f"ended after {result.wall_s:.1f} s: {counts}")
+    return result
+
+
+def _close(folder: Path) -> None:
+    """Remove what killed writers left; raise `ElevonError` unless the data set verifies."""
+    from elevon.campaign.verify import verify
+
+    sweep(folder)
+    wrong = [f"{item.name}: {item.value:.0f}" for item in verify(folder) if not item.passed]
+    if wrong:
+        raise ElevonError(
+            f"{folder}: is finished, but not whole: {'; '.join(wrong)}; "
+            f"elevon dataset verify {folder} shows all checks"
+        )
+
+
+def _note(folder: Path, text: str) -> None:
+    """Add a line to the journal, with the time and the process."""
+    when = datetime.now().astimezone().isoformat(timespec="seconds")
+    path = folder / JOURNAL
+    try:
+        handle = open_owned(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+        with os.fdopen(handle, "a", encoding="utf-8") as file:
+            file.write(f"{when} {socket.gethostname()} process {os.getpid()}: {text}\n")
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def _simulate_in_threads(work: CampaignWork, threads: int, progress: Report | None) -> None:

@@ -28,6 +28,7 @@ from elevon.campaign.resolved_file import (
 )
 from elevon.campaign.store import (
     ENDS,
+    JOURNAL,
     LOG,
     MANIFEST,
     PLAN,
@@ -107,13 +108,19 @@ class CampaignWork:
         """Number of runs whose data are there."""
         return len(self.resolved) - sum(len(self.numbers(block)) for block in self.missing)
 
+    @property
+    def missing_bytes(self) -> int:
+        """Bytes of the data that are still to be made, before compression."""
+        part = 1.0 - self.done_runs / len(self.resolved)
+        return int(self.manifest.estimate["disk"] * part)
+
     def numbers(self, block: int) -> range:
         """Return the runs of a block."""
         return range(self.edges[block], self.edges[block + 1])
 
     def check_disk(self) -> None:
         """Raise `InputError` when the disk has no room for what is missing."""
-        check_disk(self.folder, Cost.of(self).disk)
+        check_disk(self.folder, self.missing_bytes)
 
 
 def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
@@ -134,7 +141,7 @@ def open_folder(folder: Path, resolved: Resolved, text: str) -> bool:
         _check_same(folder, manifest, resolved)
         return True
     names = {path.name for path in folder.iterdir()}
-    known = {LOCK, PLAN, RESOLVED, RUNS, LOG}
+    known = {LOCK, PLAN, RESOLVED, RUNS, LOG, JOURNAL}
     plain = {name for name in names if ".part" not in name and not is_staged(name)}
     begun = plain <= known and (LOCK in plain or not plain or _is_plan(folder / PLAN, text))
     if not begun:
@@ -415,7 +422,7 @@ def new_manifest(resolved: Resolved, need: Cost) -> Manifest:
         ],
         responses=resolved.responses,
         not_acting=[] if need.checked is None else need.checked.idle,
-        estimate=need.to_dict(),
+        estimate={"disk": need.disk, "memory": need.memory},
         design=resolved.design,
         sources=resolved.sources,
         split=resolved.split,

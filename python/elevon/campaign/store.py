@@ -115,6 +115,8 @@ READ = (2, SCHEMA)
 MANIFEST, RESOLVED, PLAN = "manifest.json", "resolved.json", "plan.toml"
 LOG = "progress.log"
 """The log of finished blocks, while the campaign runs."""
+JOURNAL = "campaign.log"
+"""When and how the campaign was carried out; nothing reads it, all other files are of the plan."""
 _LONGEST = 2**30
 
 

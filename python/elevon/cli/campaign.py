@@ -101,6 +101,7 @@ def run(
     threads: int | None = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS")] = None,
     cluster: Annotated[str | None, Option(metavar="local:N")] = None,
+    silent_after: Annotated[str, Option(metavar="QUANTITY")] = "30 s",
     allow_outside: bool = False,
 ) -> Answer:
     """Run a plan into a folder; an interrupted one goes on where it was.
@@ -115,6 +116,8 @@ def run(
         Of a Dask scheduler.
     cluster : str
         N Dask workers started here.
+    silent_after : str
+        Name a worker without a sign; twice as late others get its blocks.
     allow_outside : bool
         Let the plan read files outside its folder.
     """
@@ -122,7 +125,8 @@ def run(
 
     read, document = load_plan(plan)
     resolved = resolve_plan(read, document, allow_outside=allow_outside)
-    work = partial(run_campaign, resolved, document.text, out)
+    silence = _silence(silent_after)
+    work = partial(run_campaign, resolved, document.text, out, silent_after=silence)
     return _carried_out(work, out, f"running {read.name}", threads, _cluster(scheduler, cluster))
 
 
@@ -133,6 +137,7 @@ def resume(
     threads: int | None = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS")] = None,
     cluster: Annotated[str | None, Option(metavar="local:N")] = None,
+    silent_after: Annotated[str, Option(metavar="QUANTITY")] = "30 s",
 ) -> Answer:
     """Go on with a campaign from its folder; the plan file is not needed.
 
@@ -142,10 +147,12 @@ def resume(
         Of a Dask scheduler.
     cluster : str
         N Dask workers started here.
+    silent_after : str
+        Name a worker without a sign; twice as late others get its blocks.
     """
     from elevon.campaign import resume_campaign
 
-    work = partial(resume_campaign, folder)
+    work = partial(resume_campaign, folder, silent_after=_silence(silent_after))
     return _carried_out(work, folder, "going on", threads, _cluster(scheduler, cluster))
 
 
@@ -181,6 +188,16 @@ def _status(folder: Path) -> dict[str, Any]:
         "active": is_locked(folder),
         "out": folder,
     }
+
+
+def _silence(text: str) -> float:
+    from elevon.errors import InputError
+    from elevon.units import parse_quantity
+
+    seconds = parse_quantity(text, "s", "--silent-after")
+    if not 1.0 <= seconds <= 86400.0:
+        raise InputError(f"--silent-after {text}: is outside 1 s to 24 h")
+    return seconds
 
 
 def _cluster(scheduler: str | None, cluster: str | None) -> str | None:
