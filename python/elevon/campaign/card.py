@@ -70,9 +70,9 @@ def describe(ds: Dataset) -> dict[str, object]:
     }
 
 
-def counted(items: Sequence[str]) -> dict[str, int]:
+def counted(items: Sequence[object]) -> dict[str, int]:
     """Return how often each text occurs, in order of the first."""
-    return dict(Counter(items))
+    return dict(Counter(str(item) for item in items))
 
 
 def distribution(column: pa.ChunkedArray) -> dict[str, object]:

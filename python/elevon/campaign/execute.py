@@ -209,11 +209,11 @@ def _simulate_missing(
 
             in_cluster(work, cluster, progress, announce, silent_after)
         outcome = finish(work)
+        counts = counted(outcome["status"]).items()
+        ended = ", ".join(f"{count} {status}" for status, count in counts)
+        _note(work.folder, f"ended after {time.perf_counter() - start:.1f} s: {ended}")
     _close(work.folder)
-    result = CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
-    counts = ", ".join(f"{count} {status}" for status, count in result.counts.items())
-    _note(work.folder, f"ended after {result.wall_s:.1f} s: {counts}")
-    return result
+    return CampaignResult(work.manifest, outcome, skipped, time.perf_counter() - start)
 
 
 def _close(folder: Path) -> None:
