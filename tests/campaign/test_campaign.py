@@ -349,12 +349,12 @@ def test_two_campaigns_of_one_plan_are_equal_to_the_byte(plan, cli, tmp_path):
     folders = [tmp_path / "one", tmp_path / "another" / "two"]
     for folder, threads in zip(folders, ("1", "2"), strict=True):
         assert cli("campaign", "run", path, "--out", folder, "--threads", threads)[0] == 0
-    held = [
+    contents = [
         {f.relative_to(folder): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
         for folder in folders
     ]
-    logs = [files.pop(Path("campaign.log")) for files in held]
-    assert held[0] == held[1]
+    logs = [files.pop(Path("campaign.log")) for files in contents]
+    assert contents[0] == held[1]
     assert str(folders[1]).encode() in logs[1]
     (folders[0] / "campaign.log").write_bytes(b"\xff nonsense")
     assert cli("campaign", "run", path, "--out", folders[0])[1]["skipped"] == 6

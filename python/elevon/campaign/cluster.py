@@ -226,22 +226,22 @@ class _Workers:
         others = [name for name, age in ages.items() if age < self._silent_after]
         taken = []
         for name in ages.keys() - others:
-            held = self._held_by(name, pending)
-            blocks = ", ".join(str(pending[future]) for future in held) or "none"
+            given = self._given_to(name, pending)
+            blocks = ", ".join(str(pending[future]) for future in given) or "none"
             if name not in self._named:
                 self._named.add(name)
                 self._announce(
                     f"worker {name} has given no sign for {ages[name]:.0f} s; its blocks: {blocks}"
                 )
-            if held and others and ages[name] > 2.0 * self._silent_after:
+            if given and others and ages[name] > 2.0 * self._silent_after:
                 self._announce(f"blocks {blocks} of the silent worker {name} are given to others")
-                taken += [(future, others) for future in held]
+                taken += [(future, others) for future in given]
         return taken
 
-    def _held_by(self, name: str, pending: Iterable[Any]) -> list[Any]:
+    def _given_to(self, name: str, pending: Iterable[Any]) -> list[Any]:
         try:
-            held: Any = self._client.processing  # has no types
-            keys = set(held([name]).get(name, ()))
+            tasks: Any = self._client.processing  # has no types
+            keys = set(tasks([name]).get(name, ()))
         # As above: whatever the library makes of a scheduler that has gone.
         except Exception as error:
             raise _scheduler_gone(self._address) from error
