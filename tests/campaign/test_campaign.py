@@ -354,7 +354,7 @@ def test_two_campaigns_of_one_plan_are_equal_to_the_byte(plan, cli, tmp_path):
         for folder in folders
     ]
     logs = [files.pop(Path("campaign.log")) for files in contents]
-    assert contents[0] == held[1]
+    assert contents[0] == contents[1]
     assert str(folders[1]).encode() in logs[1]
     (folders[0] / "campaign.log").write_bytes(b"\xff nonsense")
     assert cli("campaign", "run", path, "--out", folders[0])[1]["skipped"] == 6
