@@ -21,6 +21,7 @@ _OFFSETS = {
     "sensor.speed_offset": "motor_speed",
     "sensor.current_offset": "current_q_meas",
 }
+_BOUND = "the fit of the model runs ends at its bound: they do not say where it lies"
 _LOOSEST = 0.25  # of the value, or of the one before: a larger deviation determines nothing
 
 
@@ -65,15 +66,23 @@ def missing(free: Sequence[str] | None, estimates: Sequence[Estimate], torque: T
 
 
 def undetermined(
-    every: Sequence[Estimate], accepted: Sequence[Estimate], free: Sequence[str] | None
-) -> list[str]:
-    """Say which direct estimates were too loose, or outside the model, to be taken."""
-    return [
-        f"{item.path} is not taken: {item.value:.4g} +- {item.std:.2g} {item.unit} is not "
-        "determined by the signals, or not possible in the model"
+    every: Sequence[Estimate],
+    accepted: Sequence[Estimate],
+    free: Sequence[str] | None,
+    dynamic: Dynamic | None,
+) -> dict[str, str]:
+    """Return path to why a number stays as given: too loose, outside the model, or not seen."""
+    known = {item.path for item in accepted}
+    missing = {
+        item.path: f"{item.value:.4g} +- {item.std:.2g} {item.unit} is not determined by the "
+        "signals, or not possible in the model"
         for item in every
         if item.in_set and item not in accepted and (free is None or item.path in free)
-    ]
+    }
+    if dynamic is not None:
+        missing |= dict.fromkeys(dynamic.at_bound, _BOUND)
+        missing |= dynamic.ranking.dropped
+    return {path: why for path, why in missing.items() if path not in known}
 
 
 def with_values(

@@ -56,15 +56,13 @@ def plant_findings(
     torque: Torque,
     dynamic: Dynamic | None,
     actuator: Actuator,
-    *,
-    estimates: Sequence[Estimate],
 ) -> list[str]:
     """Sentences on torque scale, brakes, drive and misfit."""
     return [
         *_of_the_balance(plant),
         *_of_the_scale(torque, actuator),
         *_of_brakes(logs),
-        *([] if dynamic is None else _of_model_runs(dynamic, actuator, estimates)),
+        *([] if dynamic is None else _of_model_runs(dynamic, actuator)),
     ]
 
 
@@ -90,17 +88,12 @@ def _of_brakes(logs: Sequence[Log]) -> list[str]:
     return [what.format(log.name) for log in logs if log.brake.unknown]
 
 
-def _of_model_runs(
-    dynamic: Dynamic, actuator: Actuator, estimates: Sequence[Estimate]
-) -> list[str]:
-    nominal, known = actuator.parameters["drive.kind"].value, {item.path for item in estimates}
-    open_ = {p: why for p, why in dynamic.ranking.dropped.items() if p not in known}
+def _of_model_runs(dynamic: Dynamic, actuator: Actuator) -> list[str]:
+    nominal = actuator.parameters["drive.kind"].value
     drives = [(dynamic.drive, nominal)] if dynamic.drive != nominal else []
     return [
         *(_TEXTS["drive"].format(*pair) for pair in drives),
         *(_TEXTS["absorbs"].format(p, 100.0 * (a / b - 1.0), a, b) for p, a, b in dynamic.absorbed),
-        *(_TEXTS["bound"].format(path) for path in dynamic.at_bound),
-        *(_TEXTS["open"].format(*item) for item in open_.items()),
         *([] if dynamic.converged else [_TEXTS["stopped"]]),
     ]
 
@@ -431,6 +424,7 @@ def calibrate(
             warnings={log.name: log.warnings for log in logs},
         ),
         parameters=by_path(estimates),
+        undetermined=undetermined(list(context.levels.values()), estimates, free, dynamic),
         facts={**_facts(context), **_of_runs(dynamic), "held_out": errors},
         findings=_findings(context),
         wall_s=clock.perf_counter() - begin,
@@ -474,11 +468,7 @@ def _findings(context: DriveContext) -> tuple[str, ...]:
     return (
         *context.findings,
         *shortened(actuator, estimates),
-        *undetermined(list(context.levels.values()), estimates, context.free),
-        *plant_findings(
-            context.used, context.plant, context.torque, context.dynamic, actuator,
-            estimates=estimates,
-        ),
+        *plant_findings(context.used, context.plant, context.torque, context.dynamic, actuator),
         *amplitude_findings(context.commands, estimates),
     )  # fmt: skip
 

@@ -302,15 +302,16 @@ class Dynamic(Plain):
             wanted = free is None or item.path in free
             if item.path in known or (item.kind == "parameter" and not wanted):
                 continue
+            if item.path in self.at_bound:  # the data do not say where it lies
+                continue
             half = quantile(self.degrees) * float(s)
             number = Estimate(
                 item.outer(x), item.slope(x) * float(s),
                 interval=(item.outer(x - half), item.outer(x + half)),
             )  # fmt: skip
-            note = "ended at its bound" if item.path in self.at_bound else ""
             estimates.append(
                 named(
-                    number, item.path, actuator, note, source="simulation", unit=item.unit,
+                    number, item.path, actuator, source="simulation", unit=item.unit,
                     register=item.register,
                 )
             )  # fmt: skip

@@ -13,6 +13,11 @@ from elevon.logs.log import Log
 from elevon.recording import Recording
 
 _FEWEST = 100  # samples
+#: Friction per torque of the motor, where the law of friction knows of it; the laws that do not.
+LOAD_SHARE, LAWS_WITHOUT_LOAD = "friction.load_motor", ("borello", "stribeck")
+#: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
+#: 100 Hz settles it; half and twice as much are part of the intervals of a fit in closed loop.
+FALL = 0.02
 #: What shows the motor's speed, the best first.
 MOTION = ("motor_speed", "motor_position", "output_speed", "output_position")
 
@@ -45,6 +50,26 @@ def motor_ratio(actuator: Actuator) -> float:
     stages = ("gear.ratio",) if "gear.ratio" in known else ("gear.ratio_first", "gear.ratio_second")
     lead = value("screw.lead") if "screw.lead" in known else 1.0
     return math.prod(value(path) for path in stages) / lead
+
+
+def grows_with_torque(top_speed: float) -> dict[str, str | float]:
+    """Return the choices with which friction grows with the motor's torque alone.
+
+    Parameters
+    ----------
+    top_speed : float
+        Highest of the logs [rad/s].
+    """
+    return {
+        "friction.law": "load_dependent", "friction.stribeck_speed": FALL * top_speed,
+        "friction.load_external": 0.0, "friction.load_motor_stribeck": 0.0,
+        "friction.load_external_stribeck": 0.0,
+    }  # fmt: skip
+
+
+def geared(actuator: Actuator) -> bool:
+    """Return whether the motor's torque passes a gear or a screw, which may lose a share of it."""
+    return motor_ratio(actuator) != 1.0
 
 
 def _speed(log: Log, ratio: float) -> Floats:

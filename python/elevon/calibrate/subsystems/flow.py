@@ -15,7 +15,7 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
 from elevon.calibrate.stages.context import Context, Stage, run_stages, stages_of
-from elevon.calibrate.stages.log import motor_ratio
+from elevon.calibrate.stages.log import geared, motor_ratio
 from elevon.calibrate.subsystems.controller import (
     Controller,
     LawNumbers,
@@ -148,13 +148,14 @@ def _mechanics(ctx: MachineContext) -> None:
         return free_run(drive, bare(ctx.actuator, numbers), drive.effort)[1]
 
     try:
-        ctx.inverse = identify_mechanics(ctx.torques, own_motion)
+        ctx.inverse = identify_mechanics(ctx.torques, own_motion, geared=geared(ctx.actuator))
     except InputError as error:
         ctx.subsystems["mechanics"] = Subsystem(NOT, reason=str(error))
         return
-    part, written, missing = mechanics_of(ctx.inverse, ctx.actuator, ctx.effort)
+    part, written, missing, values = mechanics_of(ctx.inverse, ctx.actuator, ctx.effort)
     ctx.subsystems["mechanics"] = part
     ctx.estimates += written
+    ctx.values |= values
     ctx.reasons |= missing
 
 

@@ -1,12 +1,14 @@
-"""Mechanics from measured effort and measured motion: the inverse model by linear regression.
+"""Mechanics from measured effort and measured motion: the inverse model by regression.
 
 The torque that a motion needs is linear in its numbers: inertia times acceleration, viscous
-friction times speed, Coulomb friction in the direction of motion, a constant load. Derivatives are
-taken within a band in which they are motion and not noise; effort and regressors pass one filter
-and are thinned alike, so that the filter moves no number. The commanded motion, or the model's own
-where none was commanded, is the instrument: the sensor's noise comes back in the effort of a closed
-loop, and least squares alone would take it for friction and inertia (Janot, Vandanjon, Gautier
-2014: an instrumental variable approach for rigid industrial robots).
+friction times speed, Coulomb friction in the direction of motion, a constant load. A transmission
+loses a share of what passes through it, so that the effort is that torque over 1 - share where it
+drives, and over 1 + share where it brakes: only samples that brake tell the share from the scale of
+all the rest. Derivatives are taken within a band in which they are motion and not noise; effort and
+regressors pass one filter and are thinned alike, so that the filter moves no number. The commanded
+motion, or the model's own where none was commanded, is the instrument: the sensor's noise comes
+back in the effort of a closed loop, and least squares alone would take it for friction and inertia
+(Janot, Vandanjon, Gautier 2014: an instrumental variable approach for rigid industrial robots).
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ from elevon.errors import InputError
 from elevon.estimate import Estimate
 from elevon.estimate.regression import Regression, regressed, with_deviations
 
-NAMES = ("inertia", "viscous", "coulomb", "offset")
+LOSS = "load_loss"
+NAMES = ("inertia", "viscous", "coulomb", "offset", LOSS)
+REVERSING = NAMES[:4]
 ONE_WAY = ("inertia", "viscous", "offset")
 BANDS = (0.6, 1.6)  # of the band: other choices that no log settles. ASSUMED
 ROUNDS = 2  # of runs of the model for an instrument
@@ -37,9 +41,14 @@ HAUSMAN = 2.0  # deviations between both estimates from which least squares coun
 #: interval of 90 % just leaves out zero
 SHARE = 0.5
 DISAGREE = 3.0  # deviations between two groups of logs that are said
-#: Terms beyond the four: what else the residual is tried for.
-EXTRAS = ("load_loss", "stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
-BRAKING = 0.1  # of the samples, that must brake for a loss that grows with the effort. ASSUMED
+#: Terms beyond the model's: what else the residual is tried for.
+EXTRAS = ("stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
+BRAKING = 0.02  # of the samples, that must brake for the share that is lost to show. ASSUMED
+#: The share that is lost where the logs do not show it. ASSUMED: gears and screws of actuators pass
+#: on at least 0.7 of what they are given
+MOST_LOST = 0.3
+IMPOSSIBLE = 0.6  # a share beyond which the regression has followed something else. ASSUMED
+LOSS_ROUNDS = 20  # of the linearised regression
 DRAWN = 500  # samples of a log on the page
 SEEN = 4.0  # deviations from which a further term is reported, ...
 WORTH = 0.01  # ... and the share of the residual's variance that it explains
@@ -55,7 +64,7 @@ class InverseRows:
         Of the log.
     time, speed, effort : ndarray, shape (n,)
         s, rad/s, torque [N m] or the effort's unit.
-    columns, instrument : ndarray, shape (n, 4)
+    columns, instrument : ndarray, shape (n, 5)
         Of the regressors `NAMES`, and of those that were commanded; None without a command.
     position : ndarray, shape (n,)
         rad.
@@ -65,6 +74,8 @@ class InverseRows:
         s.
     commanded : bool
         Whether the instrument was commanded; else it is the model's own motion.
+    loss : float
+        Share that is lost where the columns are linearised.
     """
 
     name: str
@@ -77,6 +88,7 @@ class InverseRows:
     load: Floats | None
     period: float
     commanded: bool = True
+    loss: float = 0.0
 
     @property
     def strokes(self) -> tuple[Floats, Floats, float]:
@@ -116,6 +128,8 @@ class Mechanics:
         1 or -1 where nothing but one direction was logged.
     effort_rms : float
         Of the logs.
+    top_speed : float
+        Of the logs [rad/s].
     """
 
     regression: Regression
@@ -128,6 +142,7 @@ class Mechanics:
     findings: tuple[str, ...] = ()
     direction: int = 0
     effort_rms: float = 0.0
+    top_speed: float = 0.0
 
     def estimate(self, name: str) -> Estimate | None:
         """Return a number, None where the logs do not have it."""
@@ -150,22 +165,23 @@ def mechanics_rows(drive: DriveSignals, band: float, shift: float = 0.0) -> Inve
     if shift:
         effort = np.interp(drive.time + shift, drive.time, effort)
     moving = (np.abs(speed) > REST_SPEED * float(np.abs(speed).max())) & drive.good
-    one = np.ones_like(speed)
-    columns = np.column_stack([acceleration, speed, np.sign(speed), one])
+    one, nothing = np.ones_like(speed), np.zeros_like(speed)
+    columns = np.column_stack([acceleration, speed, np.sign(speed), one, nothing])
     noiseless = drive.noiseless(band)
     count = max(1, int(drive.rate / (THINNED * band)))
     both = [columns, effort[:, None], position[:, None], moving[:, None].astype(np.float64)]
     if noiseless is not None:
-        both.append(np.column_stack([noiseless[1], noiseless[0], np.sign(noiseless[0]), one]))
+        rate, change = noiseless
+        both.append(np.column_stack([change, rate, np.sign(rate), one, nothing]))
     load = drive.load
     if load is not None:
         both.append(load[:, None])
     table = _thinned(np.hstack(both), count, drive.rate)
-    keep = _inside(table, drive, count) & (table[:, 6] > MOVING)
+    keep = _inside(table, drive, count) & (table[:, 7] > MOVING)
     table, time = table[keep], drive.time[::count][keep]
-    instrument = table[:, 7:11] if noiseless is not None else None
+    instrument = table[:, 8:13] if noiseless is not None else None
     return InverseRows(
-        drive.name, time, table[:, 1], table[:, 5], table[:, 4], table[:, :4], instrument,
+        drive.name, time, table[:, 1], table[:, 6], table[:, 5], table[:, :5], instrument,
         table[:, -1] if load is not None else None, drive.period * count,
         drive.model_speed is None,
     )  # fmt: skip
@@ -194,7 +210,7 @@ OwnMotion = Callable[[DriveSignals, Mapping[str, float]], Floats]
 
 
 def identify_mechanics(
-    drives: Sequence[DriveSignals], own_motion: OwnMotion | None = None
+    drives: Sequence[DriveSignals], own_motion: OwnMotion | None = None, *, geared: bool = True
 ) -> Mechanics:
     """Estimate inertia, friction and constant load from the effort of logs.
 
@@ -204,13 +220,15 @@ def identify_mechanics(
         Of one machine.
     own_motion : callable, optional
         Runs the model on the effort of a log: the instrument where no motion was commanded.
+    geared : bool
+        Whether the effort passes a gear or a screw, which may lose a share of it.
 
     Raises
     ------
     InputError
         Nothing moves enough.
     """
-    result = _identified(drives)
+    result = _identified(drives, geared)
     if own_motion is None or any(drive.noiseless(1.0) is not None for drive in drives):
         return result
     for _ in range(ROUNDS):
@@ -218,11 +236,11 @@ def identify_mechanics(
         if not (numbers["inertia"] > 0.0 and numbers["viscous"] >= 0.0):
             return result
         driven = [replace(drive, model_speed=own_motion(drive, numbers)) for drive in drives]
-        result = _identified(driven)
+        result = _identified(driven, geared)
     return result
 
 
-def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
+def _identified(drives: Sequence[DriveSignals], geared: bool) -> Mechanics:
     """Return the regression of the mechanics with its intervals.
 
     Raises
@@ -236,31 +254,45 @@ def _identified(drives: Sequence[DriveSignals]) -> Mechanics:
     if not every:
         raise InputError("the mechanics: no log moves for long enough to be read")
     drives, rows = [drive for drive, _ in every], [item for _, item in every]
-    names = NAMES if _reverses(rows) else ONE_WAY
+    names: tuple[str, ...] = REVERSING if _reverses(rows) else ONE_WAY
     regression, method, other = _regression(rows, names)
     if not np.isfinite(regression.covariance).all():
         raise InputError("the mechanics: the motion does not tell inertia from friction")
-    choices = []
-    if method == "instrument" and other is not None:
-        choices.append(0.5 * (regression.value + other))
-    for factor in BANDS:
-        varied = [mechanics_rows(drive, factor * band) for drive in drives]
-        choices.append(_regression(varied, names, method)[0].value)
-    half = 0.5 * drives[0].period
-    late = [_regression([mechanics_rows(d, band, s) for d in drives], names, method)[0].value
-            for s in (-half, half)]  # fmt: skip
-    # An effort that is held between samples is late by half a period; one that is a mean is not.
-    choices.append(regression.value + 0.5 * (late[1] - late[0]))
+
+    def choices(found: Regression) -> list[Floats]:
+        """Other bands, and an effort that is held between samples: late by half a period."""
+
+        def chosen(factor: float, shift: float = 0.0) -> Floats:
+            varied = [mechanics_rows(drive, factor * band, shift) for drive in drives]
+            varied = [item for item in varied if len(item.time) >= 4 * len(NAMES)]
+            if not varied:
+                return found.value
+            return _converged(varied, found.names, method, found.value)[1]
+
+        half = 0.5 * drives[0].period
+        late = 0.5 * (chosen(1.0, half) - chosen(1.0, -half))
+        return [*(chosen(factor) for factor in BANDS), found.value + late]
+
+    rows, regression, lost = _with_loss(rows, regression, method, choices, geared)
+    names = regression.names
+    more = choices(regression)
+    said = []
+    if lost > WORTH:
+        more.append(regression.value * (1.0 - lost))
+        said.append(_open(lost))
+    if method == "instrument" and other is not None and LOSS not in names:
+        more.append(0.5 * (regression.value + other))
     extras, seen, moved = _extras(rows, regression)
-    # In one direction further terms are the four's own sums: they say nothing of the four.
-    regression = regression.open_to([*choices, *moved] if "coulomb" in names else choices)
+    # In one direction further terms are the model's own sums: they say nothing of its numbers.
+    regression = regression.open_to([*more, *moved] if "coulomb" in names else more)
     separate = _separate(rows, names, method)
     regression, findings = _between(regression, separate)
     return Mechanics(
         regression, band, method, separate, extras, _friction_curve(rows, regression),
-        _residuals(rows, regression), (*findings, *seen, _confounded(names)),
+        _residuals(rows, regression), (*findings, *said, *seen, _confounded(names)),
         0 if "coulomb" in names else rows[0].direction,
         float(np.sqrt(np.mean(np.concatenate([item.effort**2 for item in rows])))),
+        max(float(np.abs(item.speed).max()) for item in rows),
     )  # fmt: skip
 
 
@@ -269,38 +301,127 @@ def _reverses(rows: Sequence[InverseRows]) -> bool:
     return 0 in directions or len(directions) > 1
 
 
+def _with_loss(
+    rows: list[InverseRows],
+    regression: Regression,
+    method: str,
+    choices: Callable[[Regression], list[Floats]],
+    geared: bool,
+) -> tuple[list[InverseRows], Regression, float]:
+    """Return the regression with the share that is lost, where the samples that brake show one.
+
+    Where they do not, the last is the root mean square of the shares that are possible: between
+    none and `MOST_LOST`, as likely as the logs make them. It is 0 where nothing can be lost.
+    """
+    names = (*regression.names, LOSS)
+    braking = np.mean(
+        np.concatenate([_predicted(item, regression) * item.speed < 0.0 for item in rows])
+    )
+    share: Estimate | None = None
+    if "coulomb" in names and braking > BRAKING:
+        lossy = _converged(rows, names, method, np.append(regression.value, 0.0))[0]
+        found = _regression(lossy, names, method)[0]
+        share = found.open_to(choices(found)).estimate(LOSS)
+        if not np.isfinite(share.std) or not abs(share.value) < IMPOSSIBLE:
+            share = None
+        elif share.value > HAUSMAN * found.std(LOSS):
+            return lossy, found, 0.0
+    if not geared:
+        return rows, regression, 0.0
+    if share is None:
+        return rows, regression, MOST_LOST / 3.0**0.5
+    from scipy.stats import truncnorm
+
+    ends = ((end - share.value) / share.std for end in (0.0, MOST_LOST))
+    possible = truncnorm(*ends, loc=share.value, scale=share.std)
+    return rows, regression, float(np.hypot(possible.mean(), possible.std()))
+
+
+def _open(share: float) -> str:
+    return (
+        f"a loss that grows with the effort is not seen; one of {100 * share:.2g} % is possible "
+        "and would take as much from inertia, friction and load: motions that brake with more "
+        "than friction tell it"
+    )
+
+
+def _converged(
+    rows: list[InverseRows], names: tuple[str, ...], method: str, start: Floats
+) -> tuple[list[InverseRows], Floats]:
+    """Return the rows linearised at the numbers that solve them, and these numbers."""
+    if LOSS not in names:
+        return rows, _solved(rows, names, method)
+    value = start
+    for _ in range(LOSS_ROUNDS):
+        linearised = [_linearised(item, value) for item in rows]
+        fresh = _solved(linearised, names, method)
+        fresh[-1] = min(max(fresh[-1], -IMPOSSIBLE), IMPOSSIBLE)
+        done = abs(fresh[-1] - value[-1]) < 1e-6
+        value = fresh
+        if done:
+            break
+    return [_linearised(item, value) for item in rows], value
+
+
+def _linearised(item: InverseRows, value: Floats) -> InverseRows:
+    """Return a log's rows about some numbers, the share that is lost last among them."""
+    loss = float(value[-1])
+
+    def about(table: Floats) -> Floats:
+        torque, direction = table[:, :4] @ value[:4], table[:, 2]
+        share = 1.0 - loss * direction * np.sign(torque)
+        return np.column_stack([table[:, :4], direction * np.abs(torque / share)]) / share[:, None]
+
+    instrument = None if item.instrument is None else about(item.instrument)
+    return replace(item, columns=about(item.columns), instrument=instrument, loss=loss)
+
+
 def _chosen(item: InverseRows, names: tuple[str, ...], instrument: bool = False) -> Floats:
     table = item.instrument if instrument else item.columns
     assert table is not None
     return table[:, [NAMES.index(name) for name in names]]
 
 
+def _target(item: InverseRows, names: tuple[str, ...]) -> Floats:
+    """Return the effort, with what the linearised loss's own column carries of it."""
+    return item.effort + item.loss * item.columns[:, 4] if LOSS in names else item.effort
+
+
+def _through(rows: Sequence[InverseRows], names: tuple[str, ...], stack: Floats) -> Floats:
+    """Return the regressors as the noiseless motion explains them."""
+    instrument = np.vstack([_chosen(item, names, instrument=True) for item in rows])
+    size = np.maximum(np.linalg.norm(instrument, axis=0), 1e-300)
+    weights = np.linalg.lstsq(instrument / size, stack, rcond=None)[0]
+    return np.asarray((instrument / size) @ weights)
+
+
+def _solved(rows: Sequence[InverseRows], names: tuple[str, ...], method: str) -> Floats:
+    """Return the numbers alone."""
+    stack = np.vstack([_chosen(item, names) for item in rows])
+    through = _through(rows, names, stack) if method == "instrument" else stack
+    scale = np.maximum(np.linalg.norm(through, axis=0), 1e-300)
+    target = np.concatenate([_target(item, names) for item in rows])
+    return np.asarray(np.linalg.lstsq(through / scale, target, rcond=None)[0] / scale)
+
+
 def _regression(
     rows: Sequence[InverseRows], names: tuple[str, ...], method: str | None = None
 ) -> tuple[Regression, str, Floats | None]:
     """Return the regression, how it was done, and what the other way gives where both can be."""
-    rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
-    if not rows:
-        raise InputError("the mechanics: no log moves for long enough")
     strokes = [item.strokes for item in rows]
     design = [_chosen(item, names) for item in rows]
-    data = [item.effort for item in rows]
+    data = [_target(item, names) for item in rows]
     plain = regressed(names, design, data, strokes, robust=False)
     if method == "least squares" or any(item.instrument is None for item in rows):
         return plain, "least squares", None
     stack, target = np.vstack(design), np.concatenate(data)
-    instrument = np.vstack([_chosen(item, names, instrument=True) for item in rows])
-    size = np.maximum(np.linalg.norm(instrument, axis=0), 1e-300)
-    weights = np.linalg.lstsq(instrument / size, stack, rcond=None)[0]
-    through = (instrument / size) @ weights
-    left = np.var(stack - through, axis=0)
-    strength = 1.0 - left / np.maximum(np.var(stack, axis=0), 1e-300)
+    through = _through(rows, names, stack)
+    strength = 1.0 - np.var(stack - through, axis=0) / np.maximum(np.var(stack, axis=0), 1e-300)
     moving = [k for k, name in enumerate(names) if name != "offset"]
     needed = INSTRUMENT if all(item.commanded for item in rows) else OWN_INSTRUMENT
     if method is None and not np.all(strength[moving] > needed):
         return plain, "least squares", None
-    scale = np.maximum(np.linalg.norm(through, axis=0), 1e-300)
-    value = np.linalg.lstsq(through / scale, target, rcond=None)[0] / scale
+    value = _solved(rows, names, "instrument")
     residual = target - stack @ value
     clean = with_deviations(names, value, through, residual, np.ones(len(target)), strokes=strokes)
     clean = replace(clean, explained=1.0 - float(np.var(residual) / np.var(target)))
@@ -314,8 +435,11 @@ def _regression(
 def _separate(
     rows: Sequence[InverseRows], names: tuple[str, ...], method: str
 ) -> dict[str, dict[str, Estimate]]:
-    """Return the numbers of each log alone, and of each direction where logs move one way."""
-    rows = [item for item in rows if len(item.time) >= 4 * len(NAMES)]
+    """Return the numbers of each log alone, and of each direction where logs move one way.
+
+    The share that is lost stays that of all.
+    """
+    names = tuple(name for name in names if name != LOSS)
     groups = {item.name: [item] for item in rows} if len(rows) > 1 else {}
     for sign, name in ((1, "forwards"), (-1, "backwards")):
         one_way = [item for item in rows if item.direction == sign]
@@ -366,13 +490,13 @@ def _extras(
     top = max(float(np.abs(item.speed).max()) for item in rows)
     for name in EXTRAS:
         columns = [c for item in rows if (c := _extra(name, item, top)) is not None]
-        if len(columns) < len(rows) or (name == "load_loss" and not _brakes(rows)):
+        if len(columns) < len(rows):
             continue
         design = [
             np.column_stack([_chosen(item, names), column])
             for item, column in zip(rows, columns, strict=True)
         ]
-        data = [item.effort for item in rows]
+        data = [_target(item, names) for item in rows]
         tried = regressed((*names, name), design, data, [r.strokes for r in rows], robust=False)
         if not np.isfinite(tried.covariance).all():
             continue
@@ -386,12 +510,6 @@ def _extras(
     return result, texts, moved
 
 
-def _brakes(rows: Sequence[InverseRows]) -> bool:
-    """Return whether the effort also brakes: else a loss that grows with it is the effort."""
-    against = np.concatenate([item.effort * np.sign(item.speed) < 0.0 for item in rows])
-    return bool(np.mean(against) > BRAKING)
-
-
 def _extra(name: str, rows: InverseRows, top: float) -> Floats | None:
     """Return the column of a further term; None where the log cannot show it."""
     speed, direction = rows.speed, np.sign(rows.speed)
@@ -402,7 +520,6 @@ def _extra(name: str, rows: InverseRows, top: float) -> Floats | None:
         wave = np.cos if name == "ripple_cos" else np.sin
         return np.asarray(wave(rows.position)) if turns >= 2.0 else None
     return {
-        "load_loss": direction * np.abs(rows.effort),
         "stribeck": direction * np.exp(-((speed / (0.05 * top)) ** 2)),
         "quadratic": speed * np.abs(speed),
         "spring": rows.position,
@@ -424,7 +541,9 @@ def _confounded(names: tuple[str, ...]) -> str:
 
 
 def _predicted(item: InverseRows, regression: Regression) -> Floats:
-    return np.asarray(_chosen(item, regression.names) @ regression.value)
+    """Return the effort that the motion needs; rows are linearised where some of it is lost."""
+    names = tuple(name for name in regression.names if name != LOSS)
+    return np.asarray(_chosen(item, names) @ regression.value[: len(names)])
 
 
 def _residuals(rows: Sequence[InverseRows], regression: Regression) -> dict[str, Floats]:
@@ -444,7 +563,12 @@ def _friction_curve(rows: Sequence[InverseRows], regression: Regression, bins: i
     inertia = regression.names.index("inertia")
     offset = regression["offset"] if "coulomb" in regression.names else 0.0
     friction = np.concatenate(
-        [item.effort - regression.value[inertia] * item.columns[:, 0] - offset for item in rows]
+        [
+            item.effort
+            - regression.value[inertia] * item.columns[:, 0]
+            - offset * item.columns[:, 3]
+            for item in rows
+        ]
     )
     edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, bins + 1)))
     place = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, len(edges) - 2)

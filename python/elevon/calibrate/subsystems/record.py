@@ -8,10 +8,15 @@ from typing import Annotated, Any
 
 from elevon.actuator import Actuator
 from elevon.calibrate.named import named
-from elevon.calibrate.stages.log import motor_ratio
+from elevon.calibrate.stages.log import (
+    LAWS_WITHOUT_LOAD,
+    LOAD_SHARE,
+    grows_with_torque,
+    motor_ratio,
+)
 from elevon.calibrate.subsystems.controller import Controller
 from elevon.calibrate.subsystems.electrics import Determination
-from elevon.calibrate.subsystems.mechanics import SHARE, Mechanics
+from elevon.calibrate.subsystems.mechanics import LOSS, SHARE, Mechanics
 from elevon.calibrate.subsystems.signals import Effort, linear
 from elevon.estimate import Estimate
 from elevon.parameters.records import records
@@ -102,13 +107,14 @@ class ReportAxis:
 
     def number(self, item: Estimate, name: str) -> Estimate:
         """Return a number of the motor's shaft in this coordinate, with its unit."""
-        power = {"inertia": 2, "viscous": 2, "coulomb": 1, "offset": 1}[name]
-        if self.torque not in {"N", "N m"}:  # an effort stays an effort in any coordinate
+        power = {"inertia": 2, "viscous": 2, "coulomb": 1, "offset": 1, LOSS: 0}[name]
+        if power and self.torque not in {"N", "N m"}:  # an effort is one in any coordinate
             power -= 1
         moved = f"{self.torque} s2/{self.place}"
         unit = {
             "inertia": {"N": "kg", "N m": "kg m2"}.get(self.torque, moved),
             "viscous": f"{self.torque} s/{self.place}",
+            LOSS: "1",
         }.get(name, self.torque)
         path = f"derived.{self.inertia if name == 'inertia' else name}"
         return replace(
@@ -118,8 +124,11 @@ class ReportAxis:
 
 def mechanics_of(
     result: Mechanics, actuator: Actuator, effort: Effort
-) -> tuple[Subsystem, list[Estimate], dict[str, str]]:
-    """Return the mechanics, what goes into the actuator file, and what is not determined."""
+) -> tuple[Subsystem, list[Estimate], dict[str, str], dict[str, str | float]]:
+    """Return the mechanics, what goes into the actuator file, what is not determined, and choices.
+
+    Where a share of the effort is lost, the choices are those of the law of friction that loses it.
+    """
     axis = ReportAxis.of(actuator, effort)
     names = [name for name in result.regression.names if result.determined(name)]
     axis_numbers = {}
@@ -158,13 +167,23 @@ def mechanics_of(
         "residual": {name: table.tolist() for name, table in result.residual.items()},
     }  # fmt: skip
     reason = "; ".join(f"{name}: {why}" for name, why in missing.items())
-    return Subsystem(status, axis_numbers, reason, more), written, _undetermined(missing)
+    values: dict[str, str | float] = {}
+    if written and LOSS in result.regression.names and _loses(actuator):
+        # The other numbers hold beside it, whether it is determined or only possible.
+        values = grows_with_torque(result.top_speed) | {LOAD_SHARE: result.regression[LOSS]}
+    return Subsystem(status, axis_numbers, reason, more), written, _undetermined(missing), values
+
+
+def _loses(actuator: Actuator) -> bool:
+    """Return whether the law of friction can be exchanged for one that grows with the torque."""
+    known = actuator.parameters
+    return LOAD_SHARE in known and str(known["friction.law"].value) in LAWS_WITHOUT_LOAD
 
 
 def _undetermined(missing: Mapping[str, str]) -> dict[str, str]:
     paths = {
         "inertia": "motor.inertia", "viscous": "friction.viscous", "coulomb": "friction.dynamic",
-        "offset": "load.constant", "load": "load.constant",
+        "offset": "load.constant", "load": "load.constant", LOSS: LOAD_SHARE,
     }  # fmt: skip
     return {paths[name]: why for name, why in missing.items() if name in paths}
 
@@ -173,7 +192,7 @@ def _ratios(result: Mechanics, axis: ReportAxis) -> dict[str, Estimate]:
     """Return what is known whatever the scale of the effort: numbers over the inertia."""
     out, names = {}, result.regression.names
     units = {"viscous": "1/s", "coulomb": f"{axis.place}/s2", "offset": f"{axis.place}/s2"}
-    for name in names[1:]:
+    for name in [name for name in names[1:] if name != LOSS]:
         at = names.index(name)
         item = _over_inertia(result, at)
         factor = 1.0 if name == "viscous" else 1.0 / axis.ratio
@@ -222,6 +241,8 @@ def _plant(
             1.0,
             tuple(p for p, v in others.items() if v > 0.0),
         )
+    if _loses(actuator):
+        add(LOSS, LOAD_SHARE, 0.0, 1.0, ())
     damping = value("load.damping") / ratio**2 if "load.damping" in known else 0.0
     add("viscous", "friction.viscous", damping, 1.0, ("load.damping",) if damping else ())
     rubbing = value("load.friction") / abs(ratio) if "load.friction" in known else 0.0

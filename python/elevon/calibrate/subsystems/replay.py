@@ -8,7 +8,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.stages.log import motor_ratio
+from elevon.calibrate.stages.log import LOAD_SHARE, grows_with_torque, motor_ratio
 from elevon.calibrate.subsystems.controller import LawNumbers, SampledLaw
 from elevon.calibrate.subsystems.signals import DriveSignals, useful_band
 from elevon.errors import InputError
@@ -45,6 +45,9 @@ def bare(actuator: Actuator, numbers: Mapping[str, float]) -> Actuator:
         "friction.dynamic": coulomb,
         "friction.static": coulomb,
     }
+    loss = numbers.get("load_loss", 0.0)
+    if loss and LOAD_SHARE in known:
+        values |= grows_with_torque(0.0) | {LOAD_SHARE: loss}
     if "load.constant" in known:
         values["load.constant"] = numbers.get("offset", 0.0) * ratio
     return actuator.with_values(values, source="the inverse model's numbers")
@@ -74,6 +77,8 @@ def plant_experiment(
         "low.step": min(actuator.parameters.value("low.step"), drive.period / _STEPS),
     }  # fmt: skip
     known = actuator.parameters
+    if LOAD_SHARE in known:  # what passes the shaft from outside is the motor's torque here
+        values["friction.load_external"] = known.value(LOAD_SHARE)
     model = actuator.with_values(
         {path: value for path, value in values.items() if path in known}, source="open loop"
     )

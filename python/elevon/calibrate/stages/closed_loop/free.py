@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from elevon.actuator import Actuator
 from elevon.calibrate.stages.closed_loop.log import CHANNELS, NAMES, recorded_roles, sigma, unsigned
-from elevon.calibrate.stages.log import motor_ratio
+from elevon.calibrate.stages.log import LOAD_SHARE, motor_ratio
 from elevon.data import packaged_toml
 from elevon.errors import unknown
 from elevon.estimate import Free
@@ -19,8 +19,6 @@ STRUCTURES = ("cascade", "pid")
 _LATEST = 2e-2  # s, lag of a current loop
 #: Static over dynamic friction: the fit's own variable, so that rest never holds less.
 STICK = "friction.stick"
-#: Friction per torque of the motor, where the law knows of it.
-LOAD_SHARE = "friction.load_motor"
 #: Of the current loop: its lag stands for all that the drive waits.
 CURRENT_GAIN = "pwm.proportional_gain"
 _SECONDS = (False, "s", "sensor")  # of a delay: no logarithm, unit, register

@@ -14,16 +14,14 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.calibrate.stages.closed_loop.fit import Searched
-from elevon.calibrate.stages.closed_loop.free import LOAD_SHARE, free_list
+from elevon.calibrate.stages.closed_loop.free import free_list
 from elevon.calibrate.stages.closed_loop.log import motion
 from elevon.calibrate.stages.closed_loop.model import LoopModel
 from elevon.calibrate.stages.closed_loop.start import windows
+from elevon.calibrate.stages.log import LAWS_WITHOUT_LOAD, LOAD_SHARE, grows_with_torque
 from elevon.estimate.free import inner, outer
 from elevon.logs.log import Log
 
-#: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
-#: 100 Hz settles it; half and twice as much are part of the intervals.
-FALL = 0.02
 _TICKS = (1e-3, 2e-3, 3e-3)  # s, tried beside the actuator file's own step
 _PERIODS = 0.25  # of the log, a step at most
 _ROUNDS = 6
@@ -75,15 +73,11 @@ def steps(actuator: Actuator, logs: Sequence[Log]) -> list[float]:
 
 def load_share(actuator: Actuator, logs: Sequence[Log], structure: str) -> Actuator:
     """Return the servo with friction that grows with the torque; a law of bristles stays."""
-    if str(actuator.parameters["friction.law"].value) not in {"borello", "stribeck"}:
+    if str(actuator.parameters["friction.law"].value) not in LAWS_WITHOUT_LOAD:
         return actuator
     model = LoopModel(actuator, logs, structure)
     top = max(float(np.nanmax(np.abs(motion(log, model.per_output)[0]))) for log in logs)
     if not top > 0.0:
         return actuator
-    values: dict[str, str | float] = {
-        "friction.law": "load_dependent", "friction.stribeck_speed": FALL * top,
-        LOAD_SHARE: 0.05, "friction.load_external": 0.0, "friction.load_motor_stribeck": 0.0,
-        "friction.load_external_stribeck": 0.0,
-    }  # fmt: skip
+    values = grows_with_torque(top) | {LOAD_SHARE: 0.05}
     return actuator.with_values(values, source="calibration")
