@@ -128,6 +128,11 @@ def test_the_kind_of_drive_is_found(logs):
     result = calibrate(logs[:1], Actuator.load("torino-rotary"), hold_out=False)
     assert result.actuator.parameters["drive.kind"].value == "pwm"
     assert any("drive.kind" in text for text in result.findings)
+    assert not result.parameters.keys() & result.undetermined.keys()
+    assert all(result.undetermined.values())
+    assert result.facts["identifiability"]["dropped"].keys() <= (
+        result.parameters.keys() | result.undetermined.keys()
+    )
     assert np.all(np.diff(result.facts["identifiability"]["singular_values"]) <= 0.0)
 
 

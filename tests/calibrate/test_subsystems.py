@@ -9,11 +9,13 @@ import pytest
 from elevon.actuator import Actuator
 from elevon.calibrate.door import calibrate, validate
 from elevon.calibrate.subsystems.controller import identify_controller
-from elevon.calibrate.subsystems.flow import identify
+from elevon.calibrate.subsystems.flow import calibrate_machine, identify
 from elevon.cli.runner import run as elevon
 from elevon.errors import InputError
 from elevon.logs.log import Log
 from elevon.parameters.records import record_of
+from tests.calibrate import linear
+from tests.calibrate.linear_set import datasheet, loop, truth
 
 MASS, VISCOUS, DRY, OFFSET, FORCE = 90.0, 200.0, 20.0, -3.0, 35.0
 PERIOD, STEPS = 1e-3, 10
@@ -233,3 +235,41 @@ def test_logs_without_a_set_point_give_inertia_and_friction():
     assert numbers["inertia"]["value"] == pytest.approx(inertia, rel=0.005)
     for name, true in (("viscous", viscous), ("coulomb", dry)):
         assert numbers[name]["low"] <= true <= numbers[name]["high"], (name, numbers[name])
+
+
+def mass_of(seed):
+    """Return the interval of the mass over the truth, of a drive written in C, and its loss."""
+    bench, rng = linear.draw(seed), np.random.default_rng(seed)
+    logs = [
+        loop("square", linear.log(bench, linear.square, 13.0, seed=seed)),
+        loop("sweep", linear.log(bench, linear.sweep, 21.0, seed=seed + 1)),
+    ]
+    given = {"motor.inertia": 2e-5, "friction.dynamic": 0.03}
+    far = {path: value * rng.uniform(0.7, 1.3) for path, value in given.items()}
+    found = identify(logs, datasheet(bench).with_values(far))
+    true = truth(bench)["whole inertia"] * bench.per_metre**2
+    interval = found.subsystems["mechanics"].parameters["mass"].interval
+    return np.array(interval) / true, found, bench
+
+
+def test_the_mass_holds_on_drives_whose_friction_grows_with_the_torque():
+    """At 100 Hz, with late channels, counts and noise; 0.85 of the intervals are to hold."""
+    intervals = np.array([mass_of(seed)[0] for seed in range(3000, 3012)])
+    assert np.mean((intervals[:, 0] <= 1.0) & (intervals[:, 1] >= 1.0)) >= 0.85
+    assert np.median(np.ptp(intervals, axis=1)) < 0.8
+
+
+def test_a_loss_that_grows_with_the_effort_is_found_where_the_motion_brakes():
+    _, found, bench = mass_of(1002)
+    share = found.subsystems["mechanics"].parameters["load_loss"]
+    assert share.interval[0] <= bench.per_load <= share.interval[1]
+    fitted = calibrate_machine(found).actuator.parameters
+    assert fitted["friction.law"].value == "load_dependent"
+    assert fitted.value("friction.load_motor") == pytest.approx(share.value)
+
+
+def test_without_braking_a_loss_is_possible_and_said():
+    _, found, _ = mass_of(1015)
+    assert "load_loss" not in found.subsystems["mechanics"].parameters
+    assert any("a loss that grows with the effort is not seen" in text for text in
+               found.inverse.findings)  # fmt: skip
