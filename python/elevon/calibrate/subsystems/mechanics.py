@@ -40,7 +40,7 @@ HAUSMAN = 2.0  # deviations between both estimates from which least squares coun
 #: Of a number: a deviation beyond which it is not determined. ASSUMED: at half the number the
 #: interval of 90 % just leaves out zero
 SHARE = 0.5
-DISAGREE = 3.0  # deviations between two groups of logs that are said
+DISAGREE = 3.0  # deviations between two groups of logs that are reported
 #: Terms beyond the model's: what else the residual is tried for.
 EXTRAS = ("stribeck", "quadratic", "spring", "ripple_cos", "ripple_sin", "load")
 BRAKING = 0.02  # of the samples, that must brake for the share that is lost to show. ASSUMED
@@ -276,10 +276,10 @@ def _identified(drives: Sequence[DriveSignals], geared: bool) -> Mechanics:
     rows, regression, lost = _with_loss(rows, regression, method, choices, geared)
     names = regression.names
     more = choices(regression)
-    said = []
+    notes = []
     if lost > WORTH:
         more.append(regression.value * (1.0 - lost))
-        said.append(_open(lost))
+        notes.append(_open(lost))
     if method == "instrument" and other is not None and LOSS not in names:
         more.append(0.5 * (regression.value + other))
     extras, seen, moved = _extras(rows, regression)
@@ -289,7 +289,7 @@ def _identified(drives: Sequence[DriveSignals], geared: bool) -> Mechanics:
     regression, findings = _between(regression, separate)
     return Mechanics(
         regression, band, method, separate, extras, _friction_curve(rows, regression),
-        _residuals(rows, regression), (*findings, *said, *seen, _confounded(names)),
+        _residuals(rows, regression), (*findings, *notes, *seen, _confounded(names)),
         0 if "coulomb" in names else rows[0].direction,
         float(np.sqrt(np.mean(np.concatenate([item.effort**2 for item in rows])))),
         max(float(np.abs(item.speed).max()) for item in rows),
