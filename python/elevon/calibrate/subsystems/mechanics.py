@@ -259,19 +259,19 @@ def _identified(drives: Sequence[DriveSignals], geared: bool) -> Mechanics:
     if not np.isfinite(regression.covariance).all():
         raise InputError("the mechanics: the motion does not tell inertia from friction")
 
-    def choices(found: Regression) -> list[Floats]:
+    def choices(fit: Regression) -> list[Floats]:
         """Other bands, and an effort that is held between samples: late by half a period."""
 
         def chosen(factor: float, shift: float = 0.0) -> Floats:
             varied = [mechanics_rows(drive, factor * band, shift) for drive in drives]
             varied = [item for item in varied if len(item.time) >= 4 * len(NAMES)]
             if not varied:
-                return found.value
-            return _converged(varied, found.names, method, found.value)[1]
+                return fit.value
+            return _converged(varied, fit.names, method, fit.value)[1]
 
         half = 0.5 * drives[0].period
         late = 0.5 * (chosen(1.0, half) - chosen(1.0, -half))
-        return [*(chosen(factor) for factor in BANDS), found.value + late]
+        return [*(chosen(factor) for factor in BANDS), fit.value + late]
 
     rows, regression, lost = _with_loss(rows, regression, method, choices, geared)
     names = regression.names
@@ -320,12 +320,12 @@ def _with_loss(
     share: Estimate | None = None
     if "coulomb" in names and braking > BRAKING:
         lossy = _converged(rows, names, method, np.append(regression.value, 0.0))[0]
-        found = _regression(lossy, names, method)[0]
-        share = found.open_to(choices(found)).estimate(LOSS)
+        lossy_fit = _regression(lossy, names, method)[0]
+        share = lossy_fit.open_to(choices(lossy_fit)).estimate(LOSS)
         if not np.isfinite(share.std) or not abs(share.value) < IMPOSSIBLE:
             share = None
-        elif share.value > HAUSMAN * found.std(LOSS):
-            return lossy, found, 0.0
+        elif share.value > HAUSMAN * lossy_fit.std(LOSS):
+            return lossy, lossy_fit, 0.0
     if not geared:
         return rows, regression, 0.0
     if share is None:
