@@ -114,7 +114,7 @@ def _joined_time(group: Floats, time: Floats, source: str) -> tuple[Floats, list
     total = np.array(time, dtype=np.float64)
     for join in joins.tolist():
         # Two periods: how long the trimmed dwell lasted is not in the data, only that it was.
-        total[join + 1 :] += total[join] - time[join + 1] + 2.0 / _RATE
+        total[join + 1 :] += total[join] - total[join + 1] + 2.0 / _RATE
     if np.any(np.diff(total) <= 0.0):
         raise FormatError(f"{source}: time does not run forwards within a cycle")
     return total, [int(join) for join in joins]
