@@ -1,14 +1,18 @@
 """Faults without a signal in the reduced-order model: each by its closed form, in made-up logs."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from elevon.actuator import Actuator
 from elevon.diagnose.by_model import diagnose
-from elevon.diagnose.positions.closed_form import DriveLog, cause_of
+from elevon.diagnose.engine.answer import Cause
+from elevon.diagnose.positions.closed_form import DriveLog, drive_sign
+from elevon.diagnose.signs import likely_signs, sign_of
 from elevon.logs.log import Log
+from tests.diagnose.virtual import bench_logs
 
 RATIO, PAIRS = 124.0, 4.0
 COUNT = 2.0 * math.pi / (5000 * 4 * 4)
@@ -42,7 +46,9 @@ def log(*, error=None, lost=0.0, scale=1.0, leak=None, drag=0.0, stroke=220.0, *
 
 
 def named(unit, made, *healthy):
-    return cause_of(DriveLog.of(made, unit), [DriveLog.of(item, unit) for item in healthy])
+    healthy = [DriveLog.of(item, unit) for item in healthy]
+    sign = drive_sign(DriveLog.of(made, unit), healthy)
+    return None if sign is None else sign.cause
 
 
 def test_a_healthy_log_shows_none_of_them(unit):
@@ -134,3 +140,35 @@ def test_the_answer_names_it_and_what_looks_alike(unit):
     assert (answer.status, answer.best) == ("faulty", ("missing_counts@sensor.encoder",))
     assert [place.key for place in answer.faults[0].ambiguous_with] == ["gain@sensor.resolver"]
     assert "closed form" in answer.findings[0]
+
+
+@pytest.mark.filterwarnings("ignore::elevon.errors.ElevonWarning")
+def test_a_fault_of_another_kind_is_named_beside_a_sign(unit):
+    """Friction doubled and an offset of a resolver's channel at once: both, in one answer."""
+    few = [(1, []), (2, ["friction@transmission=1.0"])]
+    base, rubbing = bench_logs(unit, few)
+    angle = rubbing["motor_position"]
+    both = rubbing.with_channels(motor_position=angle + 0.02 * np.cos(angle + 0.3))
+    both = replace(both, recording=None)
+    answer = diagnose([both], unit, baselines=[base])
+    assert answer.status == "faulty"
+    assert answer.best == ("channel_offset@sensor.resolver.sine", "friction@transmission")
+    sizes = {f"{c.kind}@{c.place}": c.interval for c in answer.faults}
+    assert sizes["channel_offset@sensor.resolver.sine"][0] < 0.02
+    assert sizes["channel_offset@sensor.resolver.sine"][1] > 0.02
+    assert sizes["friction@transmission"][0] < 1.0 < sizes["friction@transmission"][1]
+    assert 0.5 < answer.p_best < answer.p_fault
+    # An error of the gear once a motor turn looks the same: it keeps its share.
+    assert answer.p_other > 0.1
+    assert any("these logs do not tell" in text for text in answer.findings)
+
+
+def test_the_probability_of_a_sign_is_that_of_its_size():
+    cause = Cause("dead", "stand.load_cell", "1", 0.0, 1.0, (1.0, 1.0))
+    seen = [sign_of(cause, x, 1.0, moves=("a",), text="") for x in (0.5, 1.0, 1.3, 3.0)]
+    probabilities = [sign.present for sign in seen]
+    assert probabilities == sorted(probabilities)
+    assert probabilities[0] < 0.05 < 0.5 < probabilities[1] < 0.9 < 0.999 < probabilities[3]
+    # As much noise in the log as the limit: the same size says little.
+    assert sign_of(cause, 1.3, 1.0, moves=("a",), text="", error=1.0).present < 0.05
+    assert likely_signs(seen) == seen[1:]

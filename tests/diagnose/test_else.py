@@ -10,7 +10,7 @@ import pytest
 from elevon.diagnose.by_model import diagnose
 from elevon.diagnose.engine.answer import Reason
 from elevon.diagnose.engine.candidates import CANDIDATES, not_modelled
-from elevon.diagnose.engine.case import Detector, LogCase, detector_of
+from elevon.diagnose.engine.case import Detector, JoinedLogs, LogCase
 from elevon.diagnose.engine.diagnosis import answer_of
 from elevon.diagnose.engine.explain import refuting
 from elevon.diagnose.engine.healthy import healthy
@@ -124,8 +124,9 @@ def test_one_feature_alone_is_a_direction_of_the_test():
     base = [[1.0] * 5]
     std = float(np.sqrt(_case(base[0], base).covariance[4, 4]))
     case = _case([1, 1, 1, 1, 1 + 4.25 * std], base)
-    residual, root, detector = detector_of([case], [BACKLASH])
-    assert detector.score((root @ residual)[None, :])[0] > detector.threshold(0.05)
+    logs = JoinedLogs((case,))
+    detector = logs.detector([BACKLASH])
+    assert logs.score(detector) > detector.threshold(0.05)
 
 
 def test_a_unit_that_the_model_does_not_show_is_not_diagnosed():

@@ -7,9 +7,9 @@ import pytest
 
 import elevon
 from elevon import Actuator
-from elevon.diagnose.by_model import diagnose
+from elevon.diagnose.by_model import Request, diagnose
 from elevon.diagnose.engine.candidates import CANDIDATES, chosen
-from elevon.diagnose.engine.case import Detector, case_of, detector_of
+from elevon.diagnose.engine.case import Detector, JoinedLogs, case_of
 from elevon.diagnose.engine.posterior import marginals, posterior, quantiles
 from elevon.diagnose.engine.replay import _RECENT, replay
 from elevon.diagnose.positions.log import LONGEST, _first_part
@@ -187,7 +187,7 @@ def test_what_moves_next_to_nothing_gives_the_detector_no_direction(unit, logs):
     at = case.model.severities["sag@supply"][1:]
     size = np.linalg.norm(case.shift("sag@supply", at) @ root.T, axis=1)
     assert 0.0 < size.max() < 2.0
-    scores = [detector_of([case], some)[2].chance(4.0) for some in (every, every[:2])]
+    scores = [JoinedLogs((case,)).detector(c).chance(4.0) for c in (every, every[:2])]
     assert scores[0] == scores[1]
 
 
@@ -227,12 +227,10 @@ def test_the_command_line(elevon_cli, logs, tmp_path):  # noqa: F811
 
 def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
     """The page's signals: the healthy model misses the log's backlash, the named one does not."""
-    from elevon.diagnose.by_model import traces_of
-
     items = read_logs([logs["backlash"]])
     base = read_logs([logs["base"]])
     result = diagnose(items, unit, baselines=base, faults=FEW)
-    traces, healthy = traces_of(items, unit, result, base)
+    traces, healthy = Request(items, base, unit).traces(result)
     assert (traces.baseline, healthy.baseline, healthy.name) == (False, True, base[0].name)
     assert healthy.panels[0].named is None
     assert healthy.panels[0].apart < 0.3 * traces.panels[0].apart

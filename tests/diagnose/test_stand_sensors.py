@@ -11,7 +11,8 @@ from elevon.actuator import Actuator
 from elevon.bench.loaded import loaded_setups, run_loaded
 from elevon.bench.procedure import Procedure
 from elevon.bench.stand import stand_of
-from elevon.diagnose.stand_sensors import diagnose_sensors, suspects_of
+from elevon.diagnose.signs import EVERYTHING
+from elevon.diagnose.stand_sensors import stand_signs
 from elevon.documents import Document, validated
 from elevon.errors import InputError
 from elevon.logs.log import Log
@@ -69,11 +70,12 @@ def healthy():
     ],
 )  # fmt: skip
 def test_a_sensor_of_the_stand_is_named_with_its_size(sensor, key, size):
-    (suspect,) = suspects_of(log_of(5, sensor), healthy())
-    assert suspect.key == key
-    assert suspect.size == pytest.approx(size, rel=0.1, abs=0.005)
-    if suspect.kind == "gain":
-        assert suspect.or_else == ""  # the motor's current says which of the two it is
+    (sign,) = stand_signs(log_of(5, sensor), healthy())
+    assert sign.key == key
+    assert sign.present > 0.9
+    assert sign.cause.severity == pytest.approx(size, rel=0.1, abs=0.005)
+    if sign.cause.kind == "gain":
+        assert sign.cause.ambiguous_with == ()  # the motor's current says which of the two it is
 
 
 @pytest.mark.parametrize(
@@ -82,21 +84,20 @@ def test_a_sensor_of_the_stand_is_named_with_its_size(sensor, key, size):
      "demagnetisation@motor=0.1", "short@motor.phase_a=0.2", "backlash@transmission=0.3 mm"],
 )  # fmt: skip
 def test_no_fault_of_the_actuator_is_a_sensor_of_the_stand(fault):
-    assert suspects_of(log_of(6, None, [fault] if fault else []), healthy()) == []
+    assert stand_signs(log_of(6, None, [fault] if fault else []), healthy()) == []
 
 
 def test_without_a_witness_the_answer_says_which_of_two():
     log = log_of(5, {"channel": "load_cell", "gain": 0.95})
     blind = [item.without("torque_current") for item in healthy()]
-    result = diagnose_sensors([log.without("torque_current")], blind, 0.05)
-    assert result is not None
-    (cause,) = result.faults
-    assert [place.key for place in cause.ambiguous_with] == ["gain@stand.load"]
-    assert (result.status, cause.place) == ("faulty", "stand.load_cell")
+    (sign,) = stand_signs(log.without("torque_current"), blind)
+    assert [place.key for place in sign.cause.ambiguous_with] == ["gain@stand.load"]
+    assert sign.key == "gain@stand.load_cell"
+    assert sign.moves == EVERYTHING  # a force that may be wrong leaves nothing to judge
 
 
 def test_without_baselines_nothing_is_said():
-    assert suspects_of(log_of(5, {"channel": "load_cell", "gain": 0.5}), ()) == []
+    assert stand_signs(log_of(5, {"channel": "load_cell", "gain": 0.5}), ()) == []
 
 
 def test_a_cell_that_measures_something_else_is_no_witness():
@@ -107,7 +108,7 @@ def test_a_cell_that_measures_something_else_is_no_witness():
         return log.with_channels(load_cell=5.0 * rng.standard_normal(len(log.time)))
 
     base = [other(log) for log in healthy()]
-    assert suspects_of(other(log_of(5)), base) == []
+    assert stand_signs(other(log_of(5)), base) == []
 
 
 def test_a_channel_that_the_stand_has_not_is_refused():
@@ -130,5 +131,5 @@ def test_a_channel_that_the_stand_has_not_is_refused():
 def test_the_stands_own_load_cell(sensor, faults, keys):
     """The switching model has the cell behind the elastic joint."""
     base = [log_of(seed, fidelity="high") for seed in (21, 22)]
-    suspects = suspects_of(log_of(23, sensor, faults, "high"), base)
-    assert [item.key for item in suspects] == keys
+    signs = stand_signs(log_of(23, sensor, faults, "high"), base)
+    assert [item.key for item in signs] == keys

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +15,13 @@ from elevon.diagnose.engine.candidates import chosen, not_candidates
 from elevon.diagnose.engine.case import calibrated, case_of
 from elevon.diagnose.engine.diagnosis import NEVER_SEEN, UNDECIDED, answer_of
 from elevon.diagnose.engine.reading import ReplayUnit
-from elevon.diagnose.pictures import SignalPanel, Traces, named_faults
-from elevon.diagnose.positions.closed_form import diagnose_by_form
+from elevon.diagnose.pictures import Traces, named_faults
+from elevon.diagnose.positions.closed_form import drive_signs
 from elevon.diagnose.positions.reading import PositionReading
 from elevon.diagnose.roles.log import role_log
-from elevon.diagnose.stand_sensors import diagnose_sensors
-from elevon.diagnose.vibration.answer import KIND, diagnose_spall, shows_passes
+from elevon.diagnose.signs import Sign, joined_signs, likely_signs
+from elevon.diagnose.stand_sensors import stand_signs
+from elevon.diagnose.vibration.answer import KIND, diagnose_spall, shows_passes, spall_sign
 from elevon.errors import InputError
 from elevon.experiment import Variant
 from elevon.logs.clocks.clock_fit import clipped_share
@@ -187,50 +188,157 @@ def diagnose(
     """
     begin = clock.perf_counter()
     check_request(logs, false_alarm)
-    wanted = turns(actuator) and not faults
-    sign = diagnose_by_form(logs, baselines, actuator, false_alarm) if wanted else None
-    seen_healthy = unit_known or bool(baselines) or spread is not None or calibrated(actuator)
+    request = Request(logs, baselines, actuator, faults, false_alarm, spread, unit_known)
+    answer = request.answer()
+    if not request.seen_healthy:
+        answer = _undecided(answer)
+    return replace(answer, seconds=clock.perf_counter() - begin)
 
-    def early(answer: Diagnosis) -> Diagnosis:
-        answer = answer if seen_healthy else _undecided(answer)
-        return replace(answer, seconds=clock.perf_counter() - begin)
 
-    if sign is not None:
-        return early(sign)
-    healthy = [reading_of(log, actuator) for log in baselines]
-    items = [reading_of(log, actuator) for log in logs]
-    broken = None if faults else _broken(logs, items, baselines, healthy, false_alarm)
-    if broken is not None:
-        return early(broken)
-    heard, notes = _heard(logs, actuator, faults, false_alarm, alone=not baselines)
-    if heard is not None:
-        return early(heard)
-    candidates = chosen(faults, actuator)
-    cases = [case_of(item, candidates, healthy, spread) for item in items]
-    if spread is not None and not any(n in spread.features for c in cases for n in c.unit.names):
-        raise InputError(
-            f"--model: the spread was learnt of {spread.actuator}; none of its features is in "
-            "these logs"
-        )
-    result = answer_of(cases, candidates, false_alarm, spread, unit_known=unit_known)
-    if spread is not None:
-        notes = (*notes, *_of_the_spread(spread, actuator, false_alarm, len(logs)))
-    blind = (*result.unobservable, *(() if faults else not_candidates(actuator)))
-    bad = (text for log in logs for text in unsound(log))
-    findings = (*bad, *result.findings, *notes)
-    return replace(
-        result, unobservable=blind, findings=findings, seconds=clock.perf_counter() - begin
-    )
+@dataclass(frozen=True)
+class Request:
+    """What a diagnosis by the model is asked for; attributes as the parameters of `diagnose`."""
+
+    logs: Sequence[Log]
+    baselines: Sequence[Log]
+    actuator: Actuator
+    faults: Sequence[str] | None = None
+    false_alarm: float = 0.05
+    spread: LearnedSpread | None = None
+    unit_known: bool = False
+
+    @property
+    def seen_healthy(self) -> bool:
+        """Whether a healthy state of the unit is known."""
+        known = self.unit_known or bool(self.baselines) or self.spread is not None
+        return known or calibrated(self.actuator)
+
+    def answer(self) -> Diagnosis:
+        """Return signs of the logs and the posterior over candidates in one answer."""
+        signs, notes = self._drive_signs(), []
+        try:
+            items = [reading_of(log, self.actuator) for log in self.logs]
+            healthy = [reading_of(log, self.actuator) for log in self.baselines]
+        except InputError as error:
+            if not signs:
+                raise
+            answer = joined_signs(self.logs, signs, self.false_alarm, None)
+            return replace(answer, findings=(*answer.findings, f"nothing else is read: {error}"))
+        signs += self._stand_signs(items, healthy)
+        if self._hears_spalls:
+            if not self.baselines:
+                return self._spall_alone()
+            heard, note = self._spall()
+            signs, notes = [*signs, *heard], [note]
+        remaining = self._by_candidates(signs, items, healthy, notes)
+        if not signs:
+            assert remaining is not None
+            return remaining
+        return joined_signs(self.logs, signs, self.false_alarm, remaining)
+
+    def _drive_signs(self) -> list[Sign]:
+        if self.faults or not turns(self.actuator):
+            return []
+        return likely_signs(drive_signs(self.logs, self.baselines, self.actuator))
+
+    def _stand_signs(self, items: Sequence[Reading], healthy: Sequence[Reading]) -> list[Sign]:
+        """Return what most logs say of the stand's sensors, each against its own test's baselines.
+
+        A sensor that fails does so in all of them; what one test alone shows is the actuator's.
+        """
+        if self.faults:
+            return []
+        found = []
+        for log, item in zip(self.logs, items, strict=True):
+            same = [b for b, x in zip(self.baselines, healthy, strict=True) if item.same(x)]
+            found.append(likely_signs(stand_signs(log, same)))
+        named = [signs for signs in found if signs]
+        return named[0] if 2 * len(named) > len(self.logs) else []
+
+    @property
+    def _hears_spalls(self) -> bool:
+        """Whether a spall is a candidate and all logs have an accelerometer fast enough."""
+        wanted = self.faults is None or any(text.startswith(f"{KIND}@") for text in self.faults)
+        return wanted and all(shows_passes(log, self.actuator) for log in self.logs)
+
+    def _spall_alone(self) -> Diagnosis:
+        try:
+            return diagnose_spall(self.logs, self.actuator, self.false_alarm)
+        except ValueError as error:
+            raise InputError(f"accelerometer: {error}") from None
+
+    def _spall(self) -> tuple[list[Sign], str]:
+        """Return what an accelerometer hears, at half of the false alarms, and a finding."""
+        try:
+            sign, note = spall_sign(self.logs, self.actuator, 0.5 * self.false_alarm)
+        except ValueError as error:
+            return [], f"accelerometer: {error}"
+        return ([] if sign is None else [sign]), note
+
+    def _by_candidates(
+        self,
+        signs: Sequence[Sign],
+        items: Sequence[Reading],
+        healthy: Sequence[Reading],
+        notes: Sequence[str],
+    ) -> Diagnosis | None:
+        """Return the posterior over candidates by what no sign moves; None: nothing is left."""
+        left_out = [name for sign in signs for name in sign.moves]
+        if "" in left_out:
+            return None
+        candidates = chosen(self.faults, self.actuator)
+        cases = [case_of(item, candidates, healthy, self.spread, left_out) for item in items]
+        cases = [case for case in cases if case.unit.names or not signs]
+        if not cases:
+            return None
+        spread = self.spread
+        if spread is not None and not any(
+            n in spread.features for c in cases for n in c.unit.names
+        ):
+            raise InputError(
+                f"--model: the spread was learnt of {spread.actuator}; none of its features is in "
+                "these logs"
+            )
+        rate = self.false_alarm
+        result = answer_of(cases, candidates, rate, spread, unit_known=self.unit_known)
+        if spread is not None:
+            notes = [*notes, *_of_the_spread(spread, self.actuator, rate, len(self.logs))]
+        blind = () if self.faults else not_candidates(self.actuator)
+        bad = (text for log in self.logs for text in unsound(log))
+        return replace(
+            result, unobservable=(*result.unobservable, *blind),
+            findings=(*bad, *result.findings, *notes),
+        )  # fmt: skip
+
+    def traces(self, result: Diagnosis) -> list[Traces]:
+        """Return each log's signals beside the healthy model's and those with what is named.
+
+        Behind them each baseline's of the same test as a log, beside the healthy model's in its
+        place.
+        """
+        texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
+        units = [ReplayUnit(), *([ReplayUnit(Variant(faults=texts))] if texts else [])]
+        items = [reading_of(log, self.actuator) for log in self.logs]
+        healthy = [reading_of(log, self.actuator) for log in self.baselines]
+        same = [b for b in healthy if any(item.same(b) for item in items)]
+        out = [_traces(item, units) for item in items]
+        return out + [replace(_traces(b, units[:1]), baseline=True) for b in same]
+
+
+def _traces(item: Reading, units: Sequence[ReplayUnit]) -> Traces:
+    return Traces(item.name, item.log.time[item.log.good], item.drawn(units))
 
 
 def _undecided(answer: Diagnosis) -> Diagnosis:
     """Return an answer for a unit whose healthy state is not known: no cause is named."""
     from elevon.diagnose.engine.page import ALONE, verdict
 
+    if answer.status == UNDECIDED:
+        return answer
     seen = ALONE + (verdict(answer).partition(": ")[2] or "no fault stands out")
     return replace(
         answer, status=UNDECIDED, faults=(), best=(), hypotheses=(), alternatives=(),
-        findings=(seen, *answer.findings, NEVER_SEEN),
+        findings=tuple(dict.fromkeys((seen, *answer.findings, NEVER_SEEN))),
     )  # fmt: skip
 
 
@@ -245,89 +353,9 @@ def _of_the_spread(
             "as far as they are alike")  # fmt: skip
 
 
-def _broken(
-    logs: Sequence[Log],
-    items: Sequence[Reading],
-    baselines: Sequence[Log],
-    healthy: Sequence[Reading],
-    rate: float,
-) -> Diagnosis | None:
-    """What most logs say of the stand's sensors, each against baselines of its own test.
-
-    A sensor that fails does so in all of them; what one test alone shows is the actuator's.
-    """
-    answers = []
-    for log, item in zip(logs, items, strict=True):
-        same = [b for b, read in zip(baselines, healthy, strict=True) if item.same(read)]
-        answers.append(diagnose_sensors([log], same, rate))
-    named = [a for a in answers if a is not None]
-    if 2 * len(named) <= len(logs):
-        return None
-    return replace(named[0], logs=tuple(log.name for log in logs))
-
-
-def _heard(
-    logs: Sequence[Log],
-    actuator: Actuator,
-    faults: Sequence[str] | None,
-    rate: float,
-    *,
-    alone: bool,
-) -> tuple[Diagnosis | None, tuple[str, ...]]:
-    """What an accelerometer hears, which the reduced-order model has not.
-
-    With baselines, by which the other channels are judged after it, at half of the false alarms.
-    None where no log has one, or no spall is a candidate.
-    """
-    wanted = faults is None or any(text.startswith(f"{KIND}@") for text in faults)
-    if not wanted or not all(shows_passes(log, actuator) for log in logs):
-        return None, ()
-    try:
-        return diagnose_spall(logs, actuator, rate if alone else 0.5 * rate, alone=alone)
-    except ValueError as error:
-        if alone:
-            raise InputError(f"accelerometer: {error}") from None
-        return None, (f"accelerometer: {error}",)
-
-
 def check_request(logs: Sequence[Log], rate: float) -> None:
     """Refuse what no method can answer."""
     if not logs:
         raise InputError("diagnosis needs at least one log")
     if not 0.0 < rate < 1.0:
         raise InputError(f"false-alarm rate {rate:g} must be between 0 and 1")
-
-
-def traces_of(
-    logs: Sequence[Log], actuator: Actuator, result: Diagnosis, baselines: Sequence[Log] = ()
-) -> list[Traces]:
-    """Return each log's signals beside the healthy model's and those with what is named.
-
-    Behind them each baseline's of the same test as a log, beside the healthy model's in its place.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        Those that were diagnosed.
-    actuator : Actuator
-        The healthy unit.
-    result : Diagnosis
-        The answer.
-    baselines : sequence of Log, optional
-        Healthy logs that it stands on.
-    """
-    texts = tuple(f"{key}={value!r}" for key, value in named_faults(result).items())
-    units = [ReplayUnit(), *([ReplayUnit(Variant(faults=texts))] if texts else [])]
-    items = [reading_of(log, actuator) for log in logs]
-    healthy = [reading_of(log, actuator) for log in baselines]
-    same = [b for b in healthy if any(item.same(b) for item in items)]
-    out = [_traces(item, units) for item in items]
-    return out + [replace(_traces(b, units[:1]), baseline=True) for b in same]
-
-
-def _traces(item: Reading, units: Sequence[ReplayUnit]) -> Traces:
-    panels = [
-        SignalPanel(s.name, s.unit, *s.lines, *([None] * (3 - len(s.lines))))
-        for s in item.drawn(units)
-    ]
-    return Traces(item.name, item.log.time[item.log.good], panels)

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
+from elevon.diagnose.by_model import Request
 from elevon.diagnose.by_model import diagnose as diagnose_by_model
-from elevon.diagnose.by_model import traces_of
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.learning.answer import diagnose_by_classes, diagnose_by_spread_and_classes
 from elevon.diagnose.learning.model import LearnedModel
@@ -22,7 +22,6 @@ from elevon.simulate.prepare import ActuatorLike, as_actuator
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
-    from elevon.diagnose.pictures import Traces
     from elevon.logs.log import Log
 
 
@@ -91,13 +90,10 @@ def _signed(
     """Return an answer with what it stands on; one of the model can draw the logs beside it."""
     from elevon import __version__
 
-    def draw() -> list[Traces]:
-        return traces_of(logs, unit, result, baselines)
-
     return replace(
         result, actuator=unit.name, parameter_hash=unit.hash, made_by=__version__,
         baselines=tuple(log.name for log in baselines),
-        draw=draw if result.method == "model" else None,
+        request=Request(logs, baselines, unit) if result.method == "model" else None,
     )  # fmt: skip
 
 

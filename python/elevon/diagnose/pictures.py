@@ -14,36 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from elevon.diagnose.engine.answer import Diagnosis, Moved
+    from elevon.diagnose.engine.reading import SignalPanel
 
 _POINTS = 800  # means drawn of a signal
 _MOST = 12  # features drawn, those that deviate most
-
-
-@dataclass(frozen=True)
-class SignalPanel:
-    """One signal of a log beside the model's.
-
-    Attributes
-    ----------
-    name, unit : str
-        As drawn.
-    log, healthy : ndarray, shape (n,)
-        Of the log, and of the healthy model in the log's test.
-    named : ndarray, shape (n,), or None
-        Of the model with the faults that are named; None where none is.
-    """
-
-    name: str
-    unit: str
-    log: Floats
-    healthy: Floats
-    named: Floats | None
-
-    @property
-    def apart(self) -> float:
-        """How far the log is from the healthy model, over that signal's own spread."""
-        off = float(np.sqrt(np.nanmean((self.log - self.healthy) ** 2)))
-        return off / (float(np.nanstd(self.healthy)) or 1.0)
 
 
 @dataclass(frozen=True)

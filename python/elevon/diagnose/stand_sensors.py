@@ -8,20 +8,14 @@ recorder. Each number has its healthy unit in the baselines of the same test.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.answer import (
-    Cause,
-    Diagnosis,
-    Explanation,
-    FaultPlace,
-    SuspectedFault,
-)
+from elevon.diagnose.engine.answer import Cause, FaultPlace
+from elevon.diagnose.signs import EVERYTHING, Sign, sign_of
 
 if TYPE_CHECKING:
     from elevon.logs.log import Log
@@ -39,47 +33,13 @@ _DEVIATIONS = 4.0
 _FOLLOWS = 0.2  # of a force's spread: what the cell of a healthy stand may miss it by
 _BLOCKS = 12  # stretches from which a regression's deviation is taken
 _FLAT = 0.2  # of the baseline's noise: below it a channel does not move
-PROBABILITY = 0.999
-"""Probability given to a contradiction of four deviations or more; ASSUMED."""
 _ISOLATED = (
-    "a sensor of the stand contradicts another one of it, which no fault of the actuator does: "
-    "mend it before the actuator is diagnosed"
+    "a sensor of the stand contradicts another one of it, which no fault of the actuator does"
 )
 _THERMOCOUPLES = ("surface_temperature", "nut_temperature")
 
 
-@dataclass(frozen=True)
-class SensorSuspect:
-    """A sensor of the stand that contradicts the others.
-
-    Attributes
-    ----------
-    kind, channel : str
-        ``gain``, ``offset``, ``stuck`` or ``dead``; role.
-    size : float
-        Share of the gain, or offset in the channel's unit; 1 of what is there or not.
-    interval : (float, float)
-        Of 90 %.
-    unit : str
-        Of the size.
-    or_else : str
-        The role that says the same with the other sign; empty: it is this one.
-    """
-
-    kind: str
-    channel: str
-    size: float
-    interval: tuple[float, float]
-    unit: str
-    or_else: str = ""
-
-    @property
-    def key(self) -> str:
-        """``KIND@stand.CHANNEL``."""
-        return f"{self.kind}@{PLACE}.{self.channel}"
-
-
-def suspects_of(log: Log, baselines: Sequence[Log]) -> list[SensorSuspect]:
+def stand_signs(log: Log, baselines: Sequence[Log]) -> list[Sign]:
     """Return the stand's sensors that contradict the others in a log, against healthy ones.
 
     Parameters
@@ -92,14 +52,29 @@ def suspects_of(log: Log, baselines: Sequence[Log]) -> list[SensorSuspect]:
     healthy = [item for item in baselines if item.has(*_present(log)) and _witnessed(item)]
     if not healthy:
         return []
-    tests: tuple[Callable[[Log, Sequence[Log]], list[SensorSuspect]], ...] = (
-        _silent, _load_cell, _thermocouples,
-    )  # fmt: skip
-    for test in tests:
-        suspects = test(log, healthy)
-        if suspects:
-            return suspects
-    return []
+    return _silent(log, healthy) or _load_cell(log, healthy) or _thermocouples(log, healthy)
+
+
+def _sign(
+    kind: str,
+    channel: str,
+    unit: str,
+    *,
+    seen: tuple[float, float],
+    size: float = 1.0,
+    deviation: float = 0.0,
+    or_else: str = "",
+) -> Sign:
+    """Return the sign of a channel: what is seen of it, over the limit; 1 of what is there or not.
+
+    `or_else` is the role that says the same with the other sign. A load that may be wrong moves all
+    that is read with it.
+    """
+    both = (FaultPlace(kind, f"{PLACE}.{or_else}"),) if or_else else ()
+    interval = (size - 1.645 * deviation, size + 1.645 * deviation)
+    cause = Cause(kind, f"{PLACE}.{channel}", unit, 0.0, size, interval, both)
+    moves = EVERYTHING if "load" in (channel, or_else) else (channel,)
+    return sign_of(cause, *seen, moves=moves, text=_ISOLATED, error=deviation)
 
 
 def _present(log: Log) -> list[str]:
@@ -125,7 +100,7 @@ def _roughness(values: Floats) -> float:
     return float(np.median(np.abs(np.diff(values))))
 
 
-def _silent(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
+def _silent(log: Log, healthy: Sequence[Log]) -> list[Sign]:
     """Return channels that do not move although the baseline's do, or that cannot be."""
     suspects = []
     for role in _present(log):
@@ -136,14 +111,17 @@ def _silent(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
         noise = min(_roughness(item[role]) for item in healthy)
         level = float(np.median(values))
         if role in _THERMOCOUPLES and not RANGE[0] < level < RANGE[1]:
-            suspects.append(SensorSuspect("dead", role, 1.0, (1.0, 1.0), "1"))
+            warm = float(np.median(healthy[0][role]))
+            suspects.append(_sign("dead", role, "1", seen=(abs(level - warm), KELVIN)))
         elif usual > 5.0 * noise and float(np.std(values)) < _FLAT * usual:
             kind = "dead" if abs(level) < 3.0 * noise else "stuck"
-            suspects.append(SensorSuspect(kind, role, 1.0, (1.0, 1.0), "1"))
+            quieter = float(np.log(usual / max(float(np.std(values)), 1e-3 * _FLAT * usual)))
+            seen = (quieter, float(-np.log(_FLAT)))
+            suspects.append(_sign(kind, role, "1", seen=seen))
     return suspects
 
 
-def _load_cell(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
+def _load_cell(log: Log, healthy: Sequence[Log]) -> list[Sign]:
     """Regress the cell on the stand's force, inertia and friction of the load side."""
     if not log.has("load_cell", "load", "motor_speed"):
         return []
@@ -151,22 +129,25 @@ def _load_cell(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
     others = np.array([_regression(item)[0] for item in healthy])
     usual = others.mean(axis=0)
     deviation = np.hypot(spread, np.std(others, axis=0))
-    gain, offset = here[0] / usual[0] - 1.0, here[1] - usual[1]
-    error = deviation[0] / usual[0]
-    size = float(np.sqrt(np.mean(log["load"] ** 2)))
+    gain, offset = float(here[0] / usual[0] - 1.0), float(here[1] - usual[1])
+    error, seen = float(deviation[0] / usual[0]), (abs(float(here[0] / usual[0] - 1.0)), GAIN)
     if abs(gain) > max(GAIN, _DEVIATIONS * error):
-        interval = (float(gain - 1.645 * error), float(gain + 1.645 * error))
         cell, force = (_torque_moved(log, healthy, role) for role in ("load_cell", "load"))
         if cell < 0.5 * abs(gain) < force:  # the motor agrees with the cell
-            size = 1.0 / (1.0 + float(gain)) - 1.0
-            width = 1.645 * float(error)
-            return [SensorSuspect("gain", "load", size, (size - width, size + width), "1")]
-        alone = force < 0.5 * abs(gain) < cell
-        other = "" if alone else "load"
-        return [SensorSuspect("gain", "load_cell", float(gain), interval, "1", other)]
-    if abs(offset) > max(FORCE * size, _DEVIATIONS * deviation[1]):
-        interval = (float(offset - 1.645 * deviation[1]), float(offset + 1.645 * deviation[1]))
-        return [SensorSuspect("offset", "load_cell", float(offset), interval, "N", "load")]
+            size = 1.0 / (1.0 + gain) - 1.0
+            return [_sign("gain", "load", "1", seen=seen, size=size, deviation=error)]
+        other = "" if force < 0.5 * abs(gain) < cell else "load"
+        return [
+            _sign("gain", "load_cell", "1", seen=seen, size=gain, deviation=error, or_else=other)
+        ]
+    least = FORCE * float(np.sqrt(np.mean(log["load"] ** 2)))
+    if abs(offset) > max(least, _DEVIATIONS * deviation[1]):
+        error, seen = float(deviation[1]), (abs(offset), least)
+        return [
+            _sign(
+                "offset", "load_cell", "N", seen=seen, size=offset, deviation=error, or_else="load"
+            )
+        ]
     return []
 
 
@@ -196,7 +177,7 @@ def _regression(log: Log) -> tuple[Floats, Floats]:
     return whole, spread
 
 
-def _thermocouples(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
+def _thermocouples(log: Log, healthy: Sequence[Log]) -> list[Sign]:
     """Compare both at the log's beginning, where a stand that has rested is as warm as its air."""
     if not log.has(*_THERMOCOUPLES):
         return []
@@ -214,70 +195,9 @@ def _thermocouples(log: Log, healthy: Sequence[Log]) -> list[SensorSuspect]:
     alone = min(moved) < 0.5 * KELVIN
     size = offset if at == 0 else -offset
     error = float(np.hypot(0.1, np.std(before)))
-    interval = (size - 1.645 * error, size + 1.645 * error)
-    return [SensorSuspect("offset", role, size, interval, "K", "" if alone else other)]
+    seen, or_else = (abs(size), KELVIN), "" if alone else other
+    return [_sign("offset", role, "K", seen=seen, size=size, deviation=error, or_else=or_else)]
 
 
 def _begin(log: Log, role: str) -> float:
     return float(np.median(log[role][: max(10, len(log.time) // 50)]))
-
-
-def diagnose_sensors(
-    logs: Sequence[Log], baselines: Sequence[Log], rate: float
-) -> Diagnosis | None:
-    """Return the answer where a sensor of the stand contradicts the others, else None.
-
-    Parameters
-    ----------
-    logs, baselines : sequence of Log
-        Of the unit; of a healthy unit in the same test.
-    rate : float
-        Of false alarms that was asked for; the thresholds here are far beyond it.
-    """
-    suspects = {item.key: item for log in logs for item in suspects_of(log, baselines)}
-    if not suspects:
-        return None
-    return contradiction(logs, [_cause(item) for item in suspects.values()], rate, _ISOLATED)
-
-
-def contradiction(
-    logs: Sequence[Log], causes: Sequence[Cause], rate: float, finding: str
-) -> Diagnosis:
-    """Return the answer that names causes by what channels of the logs say of each other.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        That were diagnosed.
-    causes : sequence of Cause
-        At least one.
-    rate : float
-        Of false alarms that was asked for.
-    finding : str
-        What the answer stands on.
-    """
-    named = tuple(SuspectedFault(c.kind, c.place, c.severity, c.unit, c.interval) for c in causes)
-    keys = tuple(f"{c.kind}@{c.place}" for c in causes)
-    return Diagnosis(
-        logs=tuple(log.name for log in logs),
-        status="faulty",
-        p_fault=PROBABILITY,
-        false_alarm=rate,
-        chance=1.0 - PROBABILITY,
-        faults=tuple(causes),
-        best=keys,
-        p_best=PROBABILITY,
-        unobservable=(),
-        detectable={},
-        features=(),
-        findings=(finding,),
-        seconds=0.0,
-        hypotheses=(Explanation(named, PROBABILITY),),
-        severity_units={key: cause.unit for key, cause in zip(keys, causes, strict=True)},
-    )
-
-
-def _cause(item: SensorSuspect) -> Cause:
-    both = (FaultPlace(item.kind, f"{PLACE}.{item.or_else}"),) if item.or_else else ()
-    place = f"{PLACE}.{item.channel}"
-    return Cause(item.kind, place, item.unit, PROBABILITY, item.size, item.interval, both)

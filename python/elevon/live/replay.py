@@ -203,7 +203,7 @@ def _diagnosed(
 
     try:
         answer = diagnose(log, actuator)
-        traces = answer.draw() if answer.draw is not None else []
+        traces = [] if answer.request is None else answer.request.traces(answer)
     except ElevonError as error:
         return Health(text=str(error)), []
     panels = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
@@ -12,7 +12,7 @@ from elevon.results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from elevon.diagnose.pictures import Traces
+    from elevon.diagnose.by_model import Request
     from elevon.report import Report
 
 SEEN = 3.0  # deviations that a fault's shift must reach to be observable
@@ -191,6 +191,9 @@ class Diagnosis(Result):
         unknown.
     reason : Reason or None
         Why no cause is named.
+    rate : str
+        ``guaranteed``: `false_alarm` holds for any distribution of healthy days, by as many healthy
+        logs as that needs; ``assumed``: by a predictive distribution on a stated prior.
     actuator, parameter_hash : str
         Name of the actuator file, and the digits of its values.
     baselines : tuple of str
@@ -202,8 +205,8 @@ class Diagnosis(Result):
     prior : mapping of str to float
         Of classes that were learnt: the share of the learnt logs that have each, by
         ``KIND@PLACE``.
-    draw : callable or None
-        Gives the signals over those of the model, for its page.
+    request : Request or None
+        Logs and actuator of an answer by the model: its page draws the signals by them.
     """
 
     logs: tuple[str, ...]
@@ -225,15 +228,14 @@ class Diagnosis(Result):
     would_be_seen: Mapping[str, float] = field(default_factory=dict)
     p_other: float = 0.0
     reason: Reason | None = None
+    rate: Literal["guaranteed", "assumed"] = "assumed"
     actuator: str = ""
     parameter_hash: str = ""
     baselines: tuple[str, ...] = ()
     made_by: str = ""
     method: str = "model"
     prior: Mapping[str, float] = field(default_factory=dict)
-    draw: Annotated[Callable[[], Sequence[Traces]] | None, WORKING] = field(
-        default=None, compare=False, repr=False
-    )
+    request: Annotated[Request | None, WORKING] = field(default=None, compare=False, repr=False)
 
     KIND: ClassVar = "diagnosis"
     TABLE: ClassVar = "faults"
@@ -268,5 +270,5 @@ class Diagnosis(Result):
         """Return its page, with the logs' signals where it was computed in this process."""
         from elevon.diagnose.engine.page import diagnosis_page
 
-        traces = () if self.draw is None else self.draw()
+        traces = () if self.request is None else self.request.traces(self)
         return diagnosis_page(self, self.actuator, date, traces=traces)

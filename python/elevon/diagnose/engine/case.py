@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -85,7 +85,7 @@ class Detector:
         alone: float = 0.0,
     ) -> None:
         self._degrees, self._anywhere = degrees, anywhere
-        self._tests = [(_Ways(directions, both, degrees), 1.0 - anywhere - alone)]
+        self._tests = [(_Ways(directions, both, degrees), max(1.0 - anywhere - alone, 1e-12))]
         if each is not None:
             self._tests.append((_Ways(each, [True] * len(each), degrees), alone))
         healthy = _student(directions.shape[1], degrees) if draws is None else draws
@@ -143,6 +143,7 @@ ANYWHERE = 0.2  # of the false alarms: what no candidate does. ASSUMED
 ALONE = 0.1  # of them: what moves one feature and is no candidate. ASSUMED
 SUSPECT = 1e-3  # chance of a baseline below which it is called faulty
 _FEWER = 5000  # draws that show such a chance
+_SEVERAL = 2  # baselines from which on a log can be judged by them without the model
 _LOW = "low."  # parameters that `elevon fit-low` fits to the switching model
 _SHARE = 3.0  # a unit's value over the model's, either way, that a shift is scaled by at most
 #: Deviations that a fault moves the features by at least where its direction counts: what one
@@ -172,6 +173,11 @@ class LogCase:
         What no candidate is looked for by.
     item : Reading, optional
         That runs the log's test.
+    baselines : tuple of FeatureVector
+        Healthy logs of the test that it stands on.
+    explains : bool
+        Whether the model shows the unit's healthy logs. Where it does not, `unit` stands on these
+        logs alone and no fault of the model explains anything.
     """
 
     name: str
@@ -182,6 +188,8 @@ class LogCase:
     misfit: Reason | None = None
     plausible: Plausibility = field(default_factory=Plausibility)
     item: Reading | None = None
+    baselines: tuple[FeatureVector, ...] = ()
+    explains: bool = True
 
     @property
     def covariance(self) -> Floats:
@@ -243,10 +251,22 @@ def case_of(
     candidates: Sequence[CandidateFault],
     baselines: Sequence[Reading],
     spread: LearnedSpread | None = None,
+    left_out: Sequence[str] = (),
 ) -> LogCase:
     """Hold a log against the model and the baselines, in whatever order they come.
 
-    With the spread that was learnt, if any.
+    Parameters
+    ----------
+    item : Reading
+        The log.
+    candidates : sequence of CandidateFault
+        Faults.
+    baselines : sequence of Reading
+        Healthy logs; those of the same test serve, others by what is pooled.
+    spread : LearnedSpread, optional
+        Of healthy days; default: the stated one.
+    left_out : sequence of str
+        Beginnings of names of features that do not count, since something else moves them.
     """
     baselines = sorted(baselines, key=lambda b: b.key())
     others = [b for b in baselines if not item.same(b)]
@@ -255,24 +275,20 @@ def case_of(
     references = [(b.name, b.features if item.repeats(b) else transferred(b, model)) for b in same]
     names = [n for n in item.features.names if n in model.healthy.names]
     names = [n for n in names if all(n in e.names for _, e in references)]
-    names = item.usable(names, same)
+    names = [n for n in item.usable(names, same) if not n.startswith(tuple(left_out))]
     elsewhere = []
     if any(model.table[n].pooled for n in names):
         elsewhere = [Elsewhere(b.features, modelled(b)) for b in others if item.pools(b)]
-
-    def against(features: FeatureVector, logs: Sequence[FeatureVector]) -> LogCase:
-        unit = healthy(model, names, logs, spread_known=spread)
-        return LogCase("", features.only(names), unit, model)
-
-    sound, findings, misfit = _sound(references, candidates, against)
-    unit = healthy(model, names, sound, elsewhere, spread)
-    findings += item.notes(same)
-    trusted = [
-        b for b, (_, known) in zip(same, references, strict=True) if any(known is s for s in sound)
-    ]
-    features = item.features.only(names)
-    plausible = plausibility(item, trusted)
-    return LogCase(item.name, features, unit, model, tuple(findings), misfit, plausible, item)
+    trial = _Trial(model, tuple(names), tuple(candidates), spread)
+    sound, findings, misfit, explains = _sound(references, trial)
+    known = tuple(features.only(names) for k, (_, features) in enumerate(references) if k in sound)
+    unit = trial.unit(known, elsewhere, by_data=not explains)
+    trusted = [b for k, b in enumerate(same) if k in sound]
+    plausible = plausibility(item, trusted).without(left_out)
+    return LogCase(
+        item.name, item.features.only(names), unit, model, (*findings, *item.notes(same)), misfit,
+        plausible, item, known, explains,
+    )  # fmt: skip
 
 
 def transferred(item: Reading, model: Replay) -> FeatureVector:
@@ -287,29 +303,74 @@ def transferred(item: Reading, model: Replay) -> FeatureVector:
     return replace(features, values=values)
 
 
-def _sound(
-    references: Sequence[tuple[str, FeatureVector]],
-    candidates: Sequence[CandidateFault],
-    against: Callable[[FeatureVector, Sequence[FeatureVector]], LogCase],
-) -> tuple[list[FeatureVector], list[str], Reason | None]:
-    """Leave out baselines that deviate from the model and from the others, and say so.
+@dataclass(frozen=True)
+class _Trial:
+    """What a log of one test is held against, with one choice of healthy logs or another."""
 
-    Where none is left the model does not show what the healthy unit shows, nor then what a fault
-    would do to it.
+    model: Replay
+    names: tuple[str, ...]
+    candidates: tuple[CandidateFault, ...]
+    spread: LearnedSpread | None
+
+    def unit(
+        self,
+        logs: Sequence[FeatureVector],
+        elsewhere: Sequence[Elsewhere] = (),
+        *,
+        by_data: bool = False,
+    ) -> Healthy:
+        """Return the healthy unit by some logs."""
+        return healthy(
+            self.model, self.names, logs, elsewhere, spread_known=self.spread, by_data=by_data
+        )
+
+    def case(
+        self, features: FeatureVector, logs: Sequence[FeatureVector], *, by_data: bool = False
+    ) -> LogCase:
+        """Return a log against the healthy unit by others."""
+        unit = self.unit(logs, by_data=by_data)
+        return LogCase("", features.only(self.names), unit, self.model, explains=not by_data)
+
+    def chance(
+        self, features: FeatureVector, logs: Sequence[FeatureVector], *, by_data: bool = False
+    ) -> float:
+        """Return how often a healthy unit deviates as much; by data no fault gives a direction."""
+        case = self.case(features, logs, by_data=by_data)
+        return chance_of(case, () if by_data else self.candidates)
+
+
+#: Of a unit that the model does not show: what its logs are judged by.
+BY_DATA = (
+    "the model does not show the healthy logs of this unit, so no fault of it is named: detection "
+    "is by these logs alone"
+)
+
+
+def _sound(
+    references: Sequence[tuple[str, FeatureVector]], trial: _Trial
+) -> tuple[list[int], list[str], Reason | None, bool]:
+    """Return which baselines count, findings, the model's misfit, and whether it explains.
+
+    A baseline that deviates from the model and from the others is left out. Where the model shows
+    none of several, what is left of them is no spread of healthy days: then each is held against
+    the others without the model. Where none is left the model does not show what the healthy unit
+    shows, nor then what a fault would do to it.
     """
-    sound: list[FeatureVector] = []
+    logs = [features for _, features in references]
+    alone = [trial.chance(features, ()) for features in logs]
+    explains = len(logs) < _SEVERAL or max(alone) >= SUSPECT
+    sound: list[int] = []
     findings: list[str] = []
     misfit = None
     for k, (name, features) in enumerate(references):
-        others = [e for j, (_, e) in enumerate(references) if j != k]
-        alone = against(features, [])
-        chances = [chance_of(alone, candidates)]
+        others = [*logs[:k], *logs[k + 1 :]]
+        chance = alone[k]
         if others:
-            chances.append(chance_of(against(features, others), candidates))
-        if max(chances) >= SUSPECT:
-            sound.append(features)
+            chance = max(chance, trial.chance(features, others, by_data=not explains))
+        if chance >= SUSPECT:
+            sound.append(k)
             continue
-        misfit = misfit or farthest(alone)
+        misfit = misfit or farthest(trial.case(features, ()))
         reason = "it is unlike the other baselines"
         if not others:
             reason = "the actuator file is not calibrated to this unit (elevon calibrate)"
@@ -317,7 +378,11 @@ def _sound(
             f"baseline {name} looks faulty itself, or {reason}: a healthy unit deviates as much "
             f"in less than {100 * SUSPECT:g} % of logs; it is left out"
         )
-    return sound, findings, None if sound else misfit
+    if not explains and len(sound) >= _SEVERAL:
+        off = farthest(trial.case(logs[sound[0]], ()))
+        findings.append(f"{BY_DATA} ({off.feature} is {off.value:.3g}, beyond {off.limit:.3g})")
+        return sound, findings, None, False
+    return sound, findings, None if sound and explains else misfit, True
 
 
 def farthest(case: LogCase) -> Reason:
@@ -336,57 +401,99 @@ def farthest(case: LogCase) -> Reason:
 
 def chance_of(case: LogCase, candidates: Sequence[CandidateFault]) -> float:
     """Return how often a healthy unit deviates as much as this log."""
-    residual, root, detector = detector_of([case], candidates, _FEWER)
-    return detector.chance(float(detector.score((root @ residual)[None, :])[0]))
+    logs = JoinedLogs((case,))
+    detector = logs.detector(candidates, _FEWER)
+    return detector.chance(logs.score(detector))
 
 
-def detector_of(
-    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], count: int = DRAWS
-) -> tuple[Floats, Floats, Detector]:
-    """Return the deviation from healthy, what whitens it, and the test by so many draws.
+@dataclass(frozen=True)
+class JoinedLogs:
+    """Logs of one unit taken together; what changes from run to run is independent between them.
 
-    A shift shorter than
-    `_DIRECTED` has no direction that is known: the runs' rounding is as large, and another in each.
-    Each feature alone is a direction, too, for a share of its own: something else may move no
-    other.
+    Attributes
+    ----------
+    cases : tuple of LogCase
+        One a log.
     """
-    residual, covariance = joined(cases)
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
-    rows = []
-    for c in candidates:
-        at = cases[0].model.severities[c.key]
-        moved = shift_of(cases, c.key, at[at != 0.0]) @ root.T
-        rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
-    degrees = min(case.unit.degrees for case in cases)
-    draws = _drawn(cases, count) @ root.T
-    ways = np.vstack([np.zeros((0, len(root))), *rows])
-    detector = Detector(
-        ways, [False] * len(ways), degrees, ANYWHERE, draws, each=root.T, alone=ALONE
-    )
-    return residual, root, detector
 
+    cases: tuple[LogCase, ...]
 
-def _drawn(cases: Sequence[LogCase], count: int) -> Floats:
-    """Draws of healthy logs' deviations, with what is not known of their spread."""
-    parts = [c.unit.drawn(count, c.features.std, 15 + k) for k, c in enumerate(cases)]
-    return np.hstack(parts)
+    @cached_property
+    def residual(self) -> Floats:
+        """How far the features are from the healthy unit's, shape (k,)."""
+        return np.concatenate([case.residual for case in self.cases])
 
+    @cached_property
+    def covariance(self) -> Floats:
+        """Of a healthy unit's, shape (k, k)."""
+        from scipy.linalg import block_diag
 
-def joined(cases: Sequence[LogCase]) -> tuple[Floats, Floats]:
-    """Stack the logs; what changes from run to run is independent between them."""
-    from scipy.linalg import block_diag
+        return np.asarray(block_diag(*[case.covariance for case in self.cases]))
 
-    residual = np.concatenate([case.residual for case in cases])
-    return residual, np.asarray(block_diag(*[case.covariance for case in cases]))
+    @cached_property
+    def root(self) -> Floats:
+        """What whitens the features, shape (k, k)."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.covariance)))
 
+    @cached_property
+    def errors(self) -> Floats:
+        """Model error of each number's shift on its own, as a share, shape (k,)."""
+        return np.concatenate([case.errors for case in self.cases])
 
-def shift_of(cases: Sequence[LogCase], key: str, severity: Floats) -> Floats:
-    """Return what severities, shape (m,), do to the features of all logs, shape (m, k)."""
-    return np.hstack([case.shift(key, severity) for case in cases])
+    @property
+    def degrees(self) -> float:
+        """Of freedom: how well the spread is known."""
+        return min(case.unit.degrees for case in self.cases)
+
+    @property
+    def explained(self) -> bool:
+        """Whether the model shows the unit's healthy logs in all tests."""
+        return all(case.explains for case in self.cases)
+
+    def shift(self, key: str, severity: Floats) -> Floats:
+        """Return what severities, shape (m,), do to the features, shape (m, k)."""
+        return np.hstack([case.shift(key, severity) for case in self.cases])
+
+    def shift_at(self, key: str, severity: float) -> Floats:
+        """Return what one severity does to the features, shape (k,)."""
+        return np.asarray(self.shift(key, np.array([severity]))[0])
+
+    def uncertainty(self, key: str, severity: float) -> Floats:
+        """Return the deviation that a severity gives the features, shape (k,)."""
+        return np.concatenate([case.uncertainty(key, severity) for case in self.cases])
+
+    def error_of(self, c: CandidateFault, severity: float) -> Floats:
+        """Return the covariance of the model's error in what a fault does, shape (k, k)."""
+        shift = self.shift_at(c.key, severity)
+        each = (self.errors * shift) ** 2 + self.uncertainty(c.key, severity) ** 2
+        return np.asarray(np.diag(each) + c.error**2 * np.outer(shift, shift))
+
+    def detector(self, candidates: Sequence[CandidateFault], count: int = DRAWS) -> Detector:
+        """Return the test by so many draws.
+
+        A shift shorter than `_DIRECTED` has no direction that is known: the runs' rounding is as
+        large, and another in each. Each feature alone is a direction, too, for a share of its own:
+        something else may move no other.
+        """
+        rows = [np.zeros((0, len(self.root)))]
+        for c in candidates:
+            at = self.cases[0].model.severities[c.key]
+            moved = self.shift(c.key, at[at != 0.0]) @ self.root.T
+            rows.append(moved[np.linalg.norm(moved, axis=1) >= _DIRECTED])
+        parts = [c.unit.drawn(count, c.features.std, 15 + k) for k, c in enumerate(self.cases)]
+        ways, draws = np.vstack(rows), np.hstack(parts) @ self.root.T
+        alone = ALONE if len(ways) else 1.0 - ANYWHERE  # no fault's direction takes a share
+        return Detector(
+            ways, [False] * len(ways), self.degrees, ANYWHERE, draws, each=self.root.T, alone=alone
+        )
+
+    def score(self, detector: Detector) -> float:
+        """Return what the logs are judged by."""
+        return float(detector.score((self.root @ self.residual)[None, :])[0])
 
 
 def allowed(
-    cases: Sequence[LogCase], sets: Sequence[Faults], runs: Sequence[bool]
+    logs: JoinedLogs, sets: Sequence[Faults], runs: Sequence[bool]
 ) -> tuple[Floats, Floats]:
     """Return by how much sets of faults let stray what they are not looked for by, shape (h, m).
 
@@ -395,22 +502,21 @@ def allowed(
 
     Parameters
     ----------
-    cases : sequence of LogCase
+    logs : JoinedLogs
         The logs.
     sets : sequence of sequence of (CandidateFault, float)
         Faults and severities.
     runs : sequence of bool
         Whether a set is worth a run.
     """
-    _, covariance = joined(cases)
-    root = np.linalg.inv(np.linalg.cholesky(covariance))
     strays = []
     for faults in sets:
-        moved = [shift_of(cases, c.key, np.array([s]))[0] for c, s in faults]
-        strays.append(STRAY * float(np.linalg.norm(root @ np.sum(moved, axis=0))) if moved else 0.0)
+        moved = [logs.shift_at(c.key, s) for c, s in faults]
+        size = float(np.linalg.norm(logs.root @ np.sum(moved, axis=0))) if moved else 0.0
+        strays.append(STRAY * size)
     chosen = [faults if run else () for faults, run in zip(sets, runs, strict=True)]
-    by_run = np.hstack([_run_plausible(case, chosen) for case in cases])
-    louder = np.hstack([_amplified(case, chosen) for case in cases])
+    by_run = np.hstack([_run_plausible(case, chosen) for case in logs.cases])
+    louder = np.hstack([_amplified(case, chosen) for case in logs.cases])
     return np.hypot(by_run + louder, np.array(strays)[:, None]), by_run
 
 
@@ -438,13 +544,3 @@ def _run_plausible(case: LogCase, sets: Sequence[Faults]) -> Floats:
         places = [names.index(n) for n in known]
         out[k, places] += moved / case.plausible.std[places]
     return out
-
-
-def uncertainty_of(cases: Sequence[LogCase], key: str, severity: float) -> Floats:
-    """Return the deviation that a severity gives the features of all logs, shape (k,)."""
-    return np.concatenate([case.uncertainty(key, severity) for case in cases])
-
-
-def errors_of(cases: Sequence[LogCase]) -> Floats:
-    """Return the model error of each number's shift on its own, as a share, shape (k,)."""
-    return np.concatenate([case.errors for case in cases])

@@ -18,15 +18,7 @@ from elevon.diagnose.engine.answer import (
     SuspectedFault,
 )
 from elevon.diagnose.engine.candidates import CandidateFault
-from elevon.diagnose.engine.case import (
-    Detector,
-    LogCase,
-    allowed,
-    errors_of,
-    joined,
-    shift_of,
-    uncertainty_of,
-)
+from elevon.diagnose.engine.case import Detector, Faults, JoinedLogs, LogCase, allowed
 from elevon.diagnose.engine.likelihood import stray_of
 from elevon.diagnose.engine.posterior import Posterior, marginals, quantiles
 
@@ -37,25 +29,24 @@ UNLIKELY = 1e-3  # chance of what the named faults leave below which that is a f
 _NINE_OF_TEN = 1.2816  # deviations that a standard normal number stays below in nine of ten
 _STEPS, _FINER = 100, 20  # severities over the range, and between two of them
 _POINTS = 201  # severities of another fault that are held against a cause
+_FURTHEST = 40.0  # deviations up to which a change of one feature is tried
+_FEW = 3  # features whose smallest visible change is told
 
 
 #: The finding of a faulty unit with a fault that is not among the candidates.
 NO_CANDIDATE = "no candidate explains these logs, nor is this the healthy unit"
 
 
-def unexplained(
-    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
-) -> tuple[str, ...]:
+def unexplained(logs: JoinedLogs, faults: Faults) -> tuple[str, ...]:
     """Return the finding that the named faults do not explain the logs, where they do not.
 
     What the model does not know of their shifts counts as explained.
     """
     from scipy.stats import f as fisher
 
-    left, wide = _left(cases, faults)
-    degrees = min(case.unit.degrees for case in cases)
+    left, wide = _left(logs, faults)
     square = float(left @ np.linalg.solve(wide, left)) / len(left)
-    if float(fisher.sf(square, len(left), degrees)) > UNLIKELY:
+    if float(fisher.sf(square, len(left), logs.degrees)) > UNLIKELY:
         return ()
     return (
         "what is named does not explain all of the logs: another fault, or an actuator file not "
@@ -63,35 +54,30 @@ def unexplained(
     )
 
 
-def refuting(
-    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
-) -> Reason | None:
+def refuting(logs: JoinedLogs, faults: Faults) -> Reason | None:
     """Return the feature that contradicts faults most, if one does by `REFUTED` deviations.
 
     A stray of the faults' shift (`likelihood.STRAY`) contradicts nothing.
     """
-    left, wide = _left(cases, faults)
-    _, covariance = joined(cases)
-    shifts = [shift_of(cases, c.key, np.array([severity]))[0] for c, severity in faults]
-    std = np.hypot(np.sqrt(np.diag(wide)), stray_of(covariance, shifts))
+    left, wide = _left(logs, faults)
+    shifts = [logs.shift_at(c.key, severity) for c, severity in faults]
+    std = np.hypot(np.sqrt(np.diag(wide)), stray_of(logs.covariance, shifts))
     k = int(np.argmax(np.abs(left) / std))
     if abs(left[k]) < REFUTED * std[k]:
-        return _implausible(cases, faults)
-    values = np.concatenate([case.features.values for case in cases])
+        return _implausible(logs, faults)
+    values = np.concatenate([case.features.values for case in logs.cases])
     limit = values[k] - left[k] + REFUTED * np.sign(left[k]) * std[k]
-    name = [name for case in cases for name in case.unit.names][k]
+    name = [name for case in logs.cases for name in case.unit.names][k]
     return Reason(name, float(values[k]), float(limit))
 
 
-def _implausible(
-    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
-) -> Reason | None:
+def _implausible(logs: JoinedLogs, faults: Faults) -> Reason | None:
     """Return what faults are not looked for by and leave more than `REFUTED` deviations of."""
-    if all(np.abs(case.plausible.score).max(initial=0.0) < REFUTED for case in cases):
+    if all(np.abs(case.plausible.score).max(initial=0.0) < REFUTED for case in logs.cases):
         return None
-    wide = np.hypot(1.0, allowed(cases, [faults], [True])[0][0])
+    wide = np.hypot(1.0, allowed(logs, [faults], [True])[0][0])
     at = 0
-    for case in cases:
+    for case in logs.cases:
         plausible = case.plausible
         loose = wide[at : at + len(plausible.names)]
         score = np.abs(plausible.score) / loose
@@ -106,16 +92,9 @@ def _implausible(
     return None
 
 
-def _sum(cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]) -> Floats:
-    total = np.zeros(sum(len(case.unit.names) for case in cases))
-    for key, value in zip(keys, values, strict=True):
-        total = total + shift_of(cases, key, np.array([value]))[0]
-    return total
-
-
 def causes(
     result: Posterior,
-    cases: Sequence[LogCase],
+    logs: JoinedLogs,
     candidates: Sequence[CandidateFault],
     best: Sequence[str],
 ) -> tuple[Cause, ...]:
@@ -128,7 +107,7 @@ def causes(
         if c.key in covered or (probability < LISTED and c.key not in best):
             continue
         low, middle, high = _ends(c, *marginals(result, c.key))
-        ambiguous = [o for o in _ambiguous(cases, c, middle, candidates) if o.key not in best]
+        ambiguous = [o for o in _ambiguous(logs, c, middle, candidates) if o.key not in best]
         covered |= {o.key for o in ambiguous}
         probability = min(probability + sum(result.of(o.key) for o in ambiguous), 1.0)
         names = [(c.kind, place) for place in c.same] + list(c.ambiguous)
@@ -148,33 +127,30 @@ def _ends(c: CandidateFault, grid: Floats, weight: Floats) -> tuple[float, float
     return ends[0], ends[1], ends[2]
 
 
-def _left(
-    cases: Sequence[LogCase], faults: Sequence[tuple[CandidateFault, float]]
-) -> tuple[Floats, Floats]:
+def _left(logs: JoinedLogs, faults: Faults) -> tuple[Floats, Floats]:
     """Return what faults leave of the features, and its covariance with their model errors."""
-    left, wide = joined(cases)
+    left, wide = logs.residual, logs.covariance
     for c, severity in faults:
-        shift = shift_of(cases, c.key, np.array([severity]))[0]
-        left = left - shift
-        wide = wide + _error_of(cases, c, severity, shift)
+        left = left - logs.shift_at(c.key, severity)
+        wide = wide + logs.error_of(c, severity)
     return left, wide
 
 
 def alternatives(
     result: Posterior,
-    cases: Sequence[LogCase],
+    logs: JoinedLogs,
     candidates: Sequence[CandidateFault],
     best: Sequence[str],
 ) -> tuple[Alternative, ...]:
     """Return the healthy unit and the single faults that are not the answer, likely ones first."""
     known = {c.key: c for c in candidates}
-    places = [(case.name, name) for case in cases for name in case.unit.names]
+    places = [(case.name, name) for case in logs.cases for name in case.unit.names]
     out = []
     for h, p in zip(result.hypotheses, result.probabilities, strict=True):
         if len(h.keys) > 1 or h.keys == tuple(best):
             continue
         faults = [(known[key], value) for key, value in zip(h.keys, h.best, strict=True)]
-        left, wide = _left(cases, faults)
+        left, wide = _left(logs, faults)
         score = left / np.sqrt(np.diag(wide))
         worst = int(np.argmax(np.abs(score)))
         key, severity = (h.keys[0], h.best[0]) if h.keys else ("", None)
@@ -202,7 +178,7 @@ def explanations(
 
 
 def _ambiguous(
-    cases: Sequence[LogCase],
+    logs: JoinedLogs,
     candidate: CandidateFault,
     severity: float,
     candidates: Sequence[CandidateFault],
@@ -212,13 +188,12 @@ def _ambiguous(
     What a fault does is known to the model's error only: within that error of each other's shift no
     log separates two faults. One that moves nothing to speak of is like no other.
     """
-    shift = shift_of(cases, candidate.key, np.array([severity]))[0]
-    _, covariance = joined(cases)
-    square = float(shift @ np.linalg.solve(covariance, shift))
-    alike = max(case.model.alike for case in cases)
+    shift = logs.shift_at(candidate.key, severity)
+    square = float(shift @ np.linalg.solve(logs.covariance, shift))
+    alike = max(case.model.alike for case in logs.cases)
     if square < alike**2:
         return []
-    loose = covariance + _error_of(cases, candidate, severity, shift)
+    loose = logs.covariance + logs.error_of(candidate, severity)
     root = np.linalg.inv(np.linalg.cholesky(loose))
     out = []
     for other in candidates:
@@ -227,27 +202,19 @@ def _ambiguous(
         grid = other.range(_POINTS)
         if not other.counted:
             grid = np.sort(np.concatenate((grid, 0.05 * grid)))
-        apart = (shift_of(cases, other.key, grid) - shift) @ root.T
+        apart = (logs.shift(other.key, grid) - shift) @ root.T
         if float(np.linalg.norm(apart, axis=1).min()) < alike:
             out.append(other)
     return out
 
 
-def _error_of(
-    cases: Sequence[LogCase], c: CandidateFault, severity: float, shift: Floats
-) -> Floats:
-    """Covariance of the model's error in what a fault does."""
-    each = (errors_of(cases) * shift) ** 2 + uncertainty_of(cases, c.key, severity) ** 2
-    return np.asarray(np.diag(each) + c.error**2 * np.outer(shift, shift))
-
-
 def limits(
-    cases: Sequence[LogCase], candidates: Sequence[CandidateFault], root: Floats
+    logs: JoinedLogs, candidates: Sequence[CandidateFault]
 ) -> tuple[tuple[dict[str, str], ...], dict[str, float]]:
     """Return what the logs cannot show, and the least severity of what they can."""
     blind, limits = [], {}
     for c in candidates:
-        least = _least_seen(cases, c, root)
+        least = _least_seen(logs, c)
         if least is not None:
             limits[c.key] = least
             continue
@@ -260,11 +227,11 @@ def limits(
     return tuple(blind), limits
 
 
-def _least_seen(cases: Sequence[LogCase], c: CandidateFault, root: Floats) -> float | None:
+def _least_seen(logs: JoinedLogs, c: CandidateFault) -> float | None:
     """Return the least severity that moves the features by `SEEN`, by a grid and one within it."""
     grid = np.linspace(0.0, c.high, _STEPS + 1)
     for _ in range(2):
-        size = np.linalg.norm(shift_of(cases, c.key, grid) @ root.T, axis=1)
+        size = np.linalg.norm(logs.shift(c.key, grid) @ logs.root.T, axis=1)
         seen = np.flatnonzero(size > SEEN)
         if not seen.size:
             return None
@@ -275,25 +242,21 @@ def _least_seen(cases: Sequence[LogCase], c: CandidateFault, root: Floats) -> fl
 
 
 def would_be_seen(
-    cases: Sequence[LogCase],
+    logs: JoinedLogs,
     candidates: Sequence[CandidateFault],
-    root: Floats,
     detector: Detector,
     threshold: float,
 ) -> dict[str, float]:
     """Return the severity from which on each candidate raises an alarm in nine of ten logs.
 
-    A log's noise shortens the shift of one in ten by `_NINE_OF_TEN` deviations or more. What is
-    below the threshold even at the largest severity is left out.
+    What is below the threshold even at the largest severity is left out.
 
     Parameters
     ----------
-    cases : sequence of LogCase
+    logs : JoinedLogs
         The logs.
     candidates : sequence of CandidateFault
         Faults.
-    root : ndarray, shape (k, k)
-        Whitens the features.
     detector : Detector
         The test.
     threshold : float
@@ -307,24 +270,49 @@ def would_be_seen(
     out = {}
     for c in sorted(candidates, key=lambda c: -c.rate):
         grid = c.range(_STEPS + 1) if c.counted else np.linspace(0.0, c.high, _STEPS + 1)
-        moved_by = shift_of(cases, c.key, grid) @ root.T
-        size = np.linalg.norm(moved_by, axis=1)
-        shorter = np.maximum(1.0 - _NINE_OF_TEN / np.maximum(size, _NINE_OF_TEN), 0.0)
-        unseen = np.flatnonzero(detector.score(moved_by * shorter[:, None]) <= threshold)
-        first = int(unseen[-1]) + 1 if unseen.size else 0
+        first = _first_seen(logs.shift(c.key, grid) @ logs.root.T, detector, threshold)
         if first < len(grid):
             out[c.key] = float(grid[first])
     return out
 
 
-def moved(
-    cases: Sequence[LogCase], keys: Sequence[str], values: Sequence[float]
-) -> tuple[Moved, ...]:
+def _first_seen(moved_by: Floats, detector: Detector, threshold: float) -> int:
+    """Return from which of whitened shifts, shape (m, k), on logs are called faulty.
+
+    A log's noise shortens the shift of one in ten by `_NINE_OF_TEN` deviations or more.
+    """
+    size = np.linalg.norm(moved_by, axis=1)
+    shorter = np.maximum(1.0 - _NINE_OF_TEN / np.maximum(size, _NINE_OF_TEN), 0.0)
+    unseen = np.flatnonzero(detector.score(moved_by * shorter[:, None]) <= threshold)
+    return int(unseen[-1]) + 1 if unseen.size else 0
+
+
+def changes_seen(logs: JoinedLogs, detector: Detector, threshold: float) -> tuple[str, ...]:
+    """Return the finding from which change on single features would raise an alarm.
+
+    Of a unit that the model does not show; the features that show the smallest change, as a share.
+    """
+    steps = np.linspace(0.0, _FURTHEST, _STEPS + 1)
+    mean = np.concatenate([case.unit.mean for case in logs.cases])
+    names = [name for case in logs.cases for name in case.unit.names]
+    shares: dict[str, float] = {}
+    for k, std in enumerate(np.sqrt(np.diag(logs.covariance)).tolist()):
+        first = _first_seen(np.outer(steps * std, logs.root[:, k]), detector, threshold)
+        if first <= _STEPS and mean[k]:
+            shares[names[k]] = float(steps[first]) * std / abs(float(mean[k]))
+    best = sorted(shares, key=lambda name: shares[name])[:_FEW]
+    listed = ", ".join(f"{name} from {100.0 * shares[name]:.2g} %" for name in best)
+    return (f"a change of one feature would be seen: {listed}",) if best else ()
+
+
+def moved(cases: Sequence[LogCase], faults: Faults) -> tuple[Moved, ...]:
     """Return the features with what the named faults make of it."""
     out = []
     for case in cases:
         std = np.sqrt(np.diag(case.covariance))
-        explained = _sum([case], keys, values)
+        explained = np.zeros(len(std))
+        for c, severity in faults:
+            explained = explained + case.shift(c.key, np.array([severity]))[0]
         for k, name in enumerate(case.unit.names):
             out.append(
                 Moved(

@@ -100,6 +100,8 @@ def healthy(
     baselines: Sequence[FeatureVector],
     elsewhere: Sequence[Elsewhere] = (),
     spread_known: LearnedSpread | None = None,
+    *,
+    by_data: bool = False,
 ) -> Healthy:
     """Join the model's spread with baselines.
 
@@ -109,6 +111,9 @@ def healthy(
     runs, times one that all features have in common (which baselines tell), or learnt, and the
     baselines' scatter. Where baselines deviate further from the model than was assumed, the
     assumption yields.
+
+    By data the model counts for nothing: the mean is the baselines', the spread the least deviation
+    of each feature, times what the baselines scatter. How far the model is off widens nothing.
     """
     at, count = model.places(names), len(baselines)
     records = [model.table[name] for name in names]
@@ -118,7 +123,9 @@ def healthy(
     values = np.array([b.only(names).values for b in baselines]).reshape(count, len(at))
     level = values.mean(axis=0) if count else mean
     known = stated(len(names)) if spread_known is None else spread_known.of(names)
-    spread = model.spread[np.ix_(at, at)] + np.diag(deviations(records, level, "repeats") ** 2)
+    spread = np.diag(deviations(records, level, "repeats") ** 2)
+    if not by_data:
+        spread = spread + model.spread[np.ix_(at, at)]
     off = np.diag(deviations(records, level, "mismatch") ** 2) + np.outer(
         common_error, common_error
     )
@@ -135,7 +142,7 @@ def healthy(
         weight = max(1.0 - 2.0 * shared, 0.0)  # of one day, baselines tell nothing of days
         scatter *= weight / (1.0 - min(shared, 0.5))
         alone = centre**2 / (np.diag(off) + stated_step / count)
-        steps, offsets = variances(known, scatter, weight * (count - 1), alone)
+        steps, offsets = variances(known, scatter, weight * (count - 1), None if by_data else alone)
     scale = steps.value
     spread *= np.sqrt(np.outer(scale, scale))
     off *= np.sqrt(np.outer(offsets.value, offsets.value))
@@ -144,8 +151,10 @@ def healthy(
         of_mean = (spread + np.diag(noise)) * (shared + (1.0 - shared) / count)
         off = _yielding(off, of_mean, centre)
         gain = off @ np.linalg.inv(off + of_mean)
-        left, moved = (off - gain @ off, gain @ centre) if model.prior else (of_mean, centre)
-        by_days = np.diag(of_mean) < np.diag(off)
+        left, moved = (of_mean, centre)
+        if model.prior and not by_data:
+            left, moved = off - gain @ off, gain @ centre
+        by_days = (np.diag(of_mean) < np.diag(off)) | by_data
     for k, offset, std in _pooled(records, mean, elsewhere):
         gain = left[:, k] / (left[k, k] + spread[k, k] + std**2)
         moved = moved + gain * (offset - moved[k])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class Plausibility:
         Of the log; of the baselines; of their difference.
     degrees : float
         How well the deviations are known.
+    baselines : ndarray, shape (n, m)
+        Values of each baseline.
     """
 
     names: tuple[str, ...] = ()
@@ -43,6 +46,17 @@ class Plausibility:
     mean: Floats = field(default_factory=lambda: np.zeros(0))
     std: Floats = field(default_factory=lambda: np.zeros(0))
     degrees: float = DEGREES
+    baselines: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def without(self, left_out: Sequence[str]) -> Plausibility:
+        """Return it without the features whose names begin with one of these."""
+        keep = [not name.startswith(tuple(left_out)) for name in self.names]
+        if all(keep):
+            return self
+        names = tuple(compress(self.names, keep))
+        units = tuple(compress(self.units, keep))
+        values = (self.values[keep], self.mean[keep], self.std[keep])
+        return Plausibility(names, units, *values, self.degrees, self.baselines[:, keep])
 
     @property
     def score(self) -> Floats:
@@ -68,7 +82,7 @@ def plausibility(item: Reading, baselines: Sequence[Reading]) -> Plausibility:
     std = np.sqrt(variance * scale * (1.0 + 1.0 / count))
     units = tuple(record.unit for record in records)
     values = item.plausible.only(names).values
-    return Plausibility(tuple(names), units, values, mean, std, DEGREES + count - 1)
+    return Plausibility(tuple(names), units, values, mean, std, DEGREES + count - 1, rows)
 
 
 def chance_of_any(items: Sequence[Plausibility]) -> float:
@@ -86,7 +100,7 @@ def chance_of_any(items: Sequence[Plausibility]) -> float:
 def weigh_plausibility(
     result: Posterior, score: Floats, degrees: float, allowed: Floats, by_run: Floats
 ) -> Posterior:
-    """Return the hypotheses weigh_plausibility by what no candidate is looked for by.
+    """Return the hypotheses with the weight of what no candidate is looked for by.
 
     Each leaves such features where they are, or they stray; something else moves any of them. Of
     the latter only those count that speak for it, at the price of their choice.
@@ -108,15 +122,10 @@ def weigh_plausibility(
     from scipy.stats import t as student
 
     unmoved = student.logpdf(score, degrees)
-
-    def strayed(wide: Floats) -> Floats:
-        each = np.log(_STRAYED) + student.logpdf(score, degrees, scale=np.hypot(1.0, wide))
-        return np.asarray(np.logaddexp(np.log1p(-_STRAYED) + unmoved, each).sum(axis=1))
-
     # Speaks for a cause that a model run shows to move them. A wide allowance is no evidence.
-    logs = strayed(allowed)
+    logs = _strayed(score, degrees, allowed)
     most = logs[int(np.argmax(result.probabilities))]
-    logs = np.minimum(logs, np.maximum(most, strayed(by_run)))
+    logs = np.minimum(logs, np.maximum(most, _strayed(score, degrees, by_run)))
     far = np.max([norm.logpdf(score, scale=wide) for wide in _WIDE], axis=0)
     gain = far - np.log(2.0 * len(score) * len(_WIDE)) - unmoved
     other = float(np.sum(unmoved) + np.sum(np.maximum(gain, 0.0)))
@@ -131,3 +140,12 @@ def weigh_plausibility(
         probabilities=tuple(float(after[k]) for k in order),
         other=float(after[-1]),
     )
+
+
+def _strayed(score: Floats, degrees: float, wide: Floats) -> Floats:
+    """Return the log likelihood of features that may stray by deviations, shape (h, m) to (h,)."""
+    from scipy.stats import t as student
+
+    each = np.log(_STRAYED) + student.logpdf(score, degrees, scale=np.hypot(1.0, wide))
+    left = np.log1p(-_STRAYED) + student.logpdf(score, degrees)
+    return np.asarray(np.logaddexp(left, each).sum(axis=1))

@@ -95,7 +95,8 @@ def posterior(
     pairs : bool
         Whether two faults at once are scored.
     other : bool
-        Whether something else may be there that moves the features anyhow.
+        Whether something else may be there that moves the features anyhow; without candidates it
+        is the only fault.
     most : int, optional
         Pairs that are scored: those that a coarse search beside the likeliest single faults finds
         best; the others count as impossible. Default: all.
@@ -114,7 +115,8 @@ def posterior(
         out.append(two_faults(frame, (a, b), PRIOR_FAULTY * SECOND * a.rate * b.rate / norm))
     scores = np.array([h.evidence + np.log(h.prior) for h in out])
     if other:
-        scores = np.append(scores, outside(frame) + np.log(PRIOR_FAULTY * OTHER))
+        share = OTHER if candidates else 1.0
+        scores = np.append(scores, outside(frame) + np.log(PRIOR_FAULTY * share))
     probability = np.exp(scores - scores.max())
     probability /= probability.sum()
     elsewhere = float(probability[len(out)]) if other else 0.0

@@ -55,12 +55,31 @@ class Days(NamedTuple):
     steps: Floats | None = None
 
 
-class DrawnSignal(NamedTuple):
-    """A signal of a log and of runs, for the page: name, unit, and values of shape (n,) each."""
+@dataclass(frozen=True)
+class SignalPanel:
+    """One signal of a log beside the model's.
+
+    Attributes
+    ----------
+    name, unit : str
+        As drawn.
+    log, healthy : ndarray, shape (n,)
+        Of the log, and of the healthy model in the log's test.
+    named : ndarray, shape (n,), or None
+        Of the model with the faults that are named; None where none is.
+    """
 
     name: str
     unit: str
-    lines: list[Floats]
+    log: Floats
+    healthy: Floats
+    named: Floats | None = None
+
+    @property
+    def apart(self) -> float:
+        """How far the log is from the healthy model, over that signal's own spread."""
+        off = float(np.sqrt(np.nanmean((self.log - self.healthy) ** 2)))
+        return off / (float(np.nanstd(self.healthy)) or 1.0)
 
 
 class Reading(ABC):
@@ -142,8 +161,8 @@ class Reading(ABC):
         """Return healthy units of other days."""
 
     @abstractmethod
-    def drawn(self, units: Sequence[ReplayUnit]) -> list[DrawnSignal]:
-        """Return the log's signals that a page draws, each before those of units."""
+    def drawn(self, units: Sequence[ReplayUnit]) -> list[SignalPanel]:
+        """Return the log's signals that a page draws, each beside those of units."""
 
     @abstractmethod
     def same(self, other: Reading) -> bool:

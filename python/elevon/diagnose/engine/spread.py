@@ -328,7 +328,7 @@ def variances(
     stated_worth = np.full(len(known.worth), STATED)
     if not known.learnt:
         steps = StepVariance(known.worth, total, degrees)
-        if alone is not None:
+        if alone is not None or free > 0.0:
             steps = StepVariance.of(known.worth, total, degrees, alone)
         return steps, StepVariance(stated_worth, known.mismatch_scatter, known.mismatch_free)
     off, units = known.mismatch_scatter, known.mismatch_free

@@ -185,7 +185,7 @@ def _held_out_chance(
     unit = healthy(model, names, there, spread_known=spread)
     plain = plausibility(item, base)
     case = LogCase("", item.features.only(names), unit, model, plausible=plain)
-    return judged([case], candidates)
+    return judged(case, candidates)
 
 
 def _warn_of(item: Reading, chance: float) -> None:

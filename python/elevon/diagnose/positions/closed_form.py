@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.answer import Cause, Diagnosis, FaultPlace
+from elevon.diagnose.engine.answer import Cause, FaultPlace
 from elevon.diagnose.positions.features import carried, regress
-from elevon.diagnose.stand_sensors import PROBABILITY, contradiction
+from elevon.diagnose.signs import EVERYTHING, Sign, sign_of
 from elevon.logs.log import bridged
 
 if TYPE_CHECKING:
@@ -67,10 +67,18 @@ _FLOWS = 0.2  # A: below it a current has no direction
 _WAYS = 24  # directions that are tried
 _PHASES = tuple(f"motor.phase_{p}" for p in "abc")
 _WINDINGS = tuple(f"sensor.resolver.{w}" for w in ("sine", "cosine", "excitation"))
-_ISOLATED = (
-    "named by its closed form in the log, which the reduced-order model has not: mend it before "
-    "anything else of the unit is diagnosed"
-)
+_CLOSED = "named by its closed form in the log, which the reduced-order model has not"
+#: Beginnings of names of features that each moves.
+_OF_ANGLE = (
+    "position_", "lost_motion", "speed_", "inertia_current", "current_", "voltage_",
+    "control_noise", "target_noise", "reference_noise", "integral_rate",
+)  # fmt: skip
+_OF_COUNTS = ("position_", "lost_motion", "following_gain", "reference_noise")
+_OF_CAGE = ("dry_current", "viscous_current", "current_", "creeping_current", "voltage_")
+_OF_CONTACT = (
+    *_OF_CAGE, "inertia_current", "brake_current", "speed_gain", "control_noise", "target_noise",
+    "integral_rate",
+)  # fmt: skip
 
 
 @dataclass
@@ -136,10 +144,8 @@ class DriveLog:
         return past if past.sum() >= _LEAST else moving
 
 
-def diagnose_by_form(
-    logs: Sequence[Log], baselines: Sequence[Log], actuator: Actuator, rate: float
-) -> Diagnosis | None:
-    """Return the answer where most logs show one of these faults by its closed form, else None.
+def drive_signs(logs: Sequence[Log], baselines: Sequence[Log], actuator: Actuator) -> list[Sign]:
+    """Return the sign of one of these faults that most logs show by its closed form, if any.
 
     Parameters
     ----------
@@ -147,18 +153,16 @@ def diagnose_by_form(
         Of the unit; of a healthy one.
     actuator : Actuator
         The healthy unit.
-    rate : float
-        Of false alarms that was asked for; the limits here are far beyond it.
     """
     healthy = [item for log in baselines if (item := DriveLog.of(log, actuator)) is not None]
     items = [item for log in logs if (item := DriveLog.of(log, actuator)) is not None]
-    causes = [cause for item in items if (cause := cause_of(item, healthy)) is not None]
-    if 2 * len(causes) <= len(logs) or len({cause.kind for cause in causes}) > 1:
-        return None
-    return contradiction(logs, causes[:1], rate, _ISOLATED)
+    signs = [sign for item in items if (sign := drive_sign(item, healthy)) is not None]
+    if 2 * len(signs) <= len(logs) or len({sign.cause.kind for sign in signs}) > 1:
+        return []
+    return signs[:1]
 
 
-def cause_of(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
+def drive_sign(item: DriveLog, healthy: Sequence[DriveLog]) -> Sign | None:
     """Return what a log shows by its closed form; None: nothing of the kind."""
     full = np.abs(item.log["current_ref"]) > _FULL * item.value("control.current_limit")
     if (item.use & full).sum() > _LONG * item.use.sum():
@@ -171,22 +175,30 @@ def cause_of(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
     )  # fmt: skip
 
 
-def _at_the_limit(item: DriveLog, full: Bools) -> Cause | None:
+def _at_the_limit(item: DriveLog, full: Bools) -> Sign | None:
     """All is asked for: either nothing flows, or all of it does and the shaft seems to stand."""
     log = item.log
     size = float(np.mean(np.abs(log["torque_current"][full])))
     wanted = float(np.mean(np.abs(log["current_ref"][full])))
     if size < _NOTHING * wanted:
-        return _interrupted(item)
+        return _nearly_nothing(_interrupted(item), size / wanted, _NOTHING)
     shaft = log["motor_position"][item.present]  # one channel alone tells a half of the turn
-    off = shaft - np.pi * np.round((shaft - np.median(shaft)) / np.pi)
-    if size < _ALL * wanted or float(np.ptp(off)) > _STANDS:
+    off = float(np.ptp(shaft - np.pi * np.round((shaft - np.median(shaft)) / np.pi)))
+    if size < _ALL * wanted or off > _STANDS:
         return None
+    stands = (off / math.pi, _STANDS / math.pi)
     resolver = [("resolver_open", winding) for winding in _WINDINGS]
     resolver.append(("stuck", "sensor.resolver"))
     if item.moved("output_position") > _CREEP * item.count:
-        return _cause(*resolver[0], resolver[1:])
-    return _cause("jam", "transmission", resolver, unit="N m", there=False)
+        return _nearly_nothing(_cause(*resolver[0], resolver[1:]), *stands)
+    jam = _cause("jam", "transmission", resolver, unit="N m", there=False)
+    return _nearly_nothing(jam, *stands)
+
+
+def _nearly_nothing(cause: Cause, share: float, limit: float) -> Sign:
+    """Return the sign of what is as good as gone: how small a share is left, in its logarithm."""
+    gone, needed = (-math.log(max(x, 1e-6)) for x in (share, limit))
+    return sign_of(cause, gone, needed, moves=EVERYTHING, text=_CLOSED)
 
 
 def _interrupted(item: DriveLog) -> Cause:
@@ -226,7 +238,7 @@ def _phase_shares(item: DriveLog) -> tuple[float, float] | None:
     return float(sizes.min() / sizes.max()), float(np.min(forward / back))
 
 
-def _contact(item: DriveLog) -> Cause | None:
+def _contact(item: DriveLog) -> Sign | None:
     """A contact of two phases, or of one to ground: current that the motor does not take.
 
     Between two phases it has the motor's voltage, so it turns twice an electrical turn; to ground
@@ -249,13 +261,14 @@ def _contact(item: DriveLog) -> Cause | None:
         for at in (3, 7)
     )
     size = float(np.sqrt(np.mean(log["torque_current"][moving] ** 2)))
-    if once < CONTACT * size and twice < BETWEEN * size:
+    over = max(once / CONTACT, twice / BETWEEN) / size  # limits
+    if over < 1.0:
         return None
+    places = [("ground_short", phase) for phase in _PHASES]
     if once < PURE * twice:
-        pairs = [("phase_short", f"motor.phases_{pair}") for pair in ("ab", "bc", "ca")]
-        return _cause(*pairs[0], pairs[1:], unit="S", there=False)
-    grounds = [("ground_short", phase) for phase in _PHASES]
-    return _cause(*grounds[0], grounds[1:], unit="S", there=False)
+        places = [("phase_short", f"motor.phases_{pair}") for pair in ("ab", "bc", "ca")]
+    cause = _cause(*places[0], places[1:], unit="S", there=False)
+    return sign_of(cause, over, 1.0, moves=_OF_CONTACT, text=_CLOSED)
 
 
 def _gap(item: DriveLog) -> tuple[Floats, Floats]:
@@ -272,7 +285,7 @@ def _gap(item: DriveLog) -> tuple[Floats, Floats]:
     return weights, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
-def _resolver(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
+def _resolver(item: DriveLog, healthy: Sequence[DriveLog]) -> Sign | None:
     """An error of the resolver once or twice a turn: an offset, or unlike channels."""
     weights, deviations = _gap(item)
     others = [_gap(other)[0] for other in healthy if other.moving.sum() >= _LEAST]
@@ -287,14 +300,15 @@ def _resolver(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
         return None
     ends = _ends(amplitude, error)
     if order == 1:
-        offsets = [("channel_offset", winding) for winding in _WINDINGS[:2]]
-        return _sized(offsets, ends)
-    shorts = [("resolver_short", winding) for winding in _WINDINGS[:2]]
-    shorts += [(kind, "sensor.resolver") for kind in ("mismatch", "quadrature")]
-    return _sized(shorts, [2.0 * x / (1.0 + x) for x in ends])
+        cause = _sized([("channel_offset", winding) for winding in _WINDINGS[:2]], ends)
+    else:
+        shorts = [("resolver_short", winding) for winding in _WINDINGS[:2]]
+        shorts += [(kind, "sensor.resolver") for kind in ("mismatch", "quadrature")]
+        cause = _sized(shorts, [2.0 * x / (1.0 + x) for x in ends])
+    return sign_of(cause, amplitude, RIPPLE, moves=_OF_ANGLE, text=_CLOSED, error=error)
 
 
-def _lost_counts(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
+def _lost_counts(item: DriveLog, healthy: Sequence[DriveLog]) -> Sign | None:
     """An output position that is too short, in whole counts: of another scale they are others."""
     off = (item.log["output_position"][item.use] - item.log["output_position"][0]) / item.count
     if float(np.mean(np.abs(off - np.round(off)) < _WHOLE)) < 1.0 - _WHOLE:
@@ -310,10 +324,11 @@ def _lost_counts(item: DriveLog, healthy: Sequence[DriveLog]) -> Cause | None:
     kinds = [("missing_counts", "sensor.encoder"), ("gain", "sensor.resolver")]
     if error > _STEPS * more:  # what is lost in one place leaves steps, no straight line
         kinds = [("dark_sectors", "sensor.encoder"), kinds[0]]
-    return _sized(kinds, [x / (1.0 + x) for x in ends])
+    cause = _sized(kinds, [x / (1.0 + x) for x in ends])
+    return sign_of(cause, more, LOST, moves=_OF_COUNTS, text=_CLOSED, error=error)
 
 
-def _cage(item: DriveLog) -> Cause | None:
+def _cage(item: DriveLog) -> Sign | None:
     """Friction once a turn of the cage of the motor's bearing, at the order of its geometry."""
     log, moving = item.log, item.moving
     value = item.value
@@ -330,11 +345,13 @@ def _cage(item: DriveLog) -> Cause | None:
                np.ones_like(speed)]  # fmt: skip
     weights, covariance = regress([column[moving] for column in columns], current[moving])
     size, error = float(np.hypot(*weights[:2])), float(np.sqrt(np.trace(covariance[:2, :2])))
-    if size < max(CAGE * float(np.sqrt(np.mean(current[moving] ** 2))), _DEVIATIONS * error):
+    limit = CAGE * float(np.sqrt(np.mean(current[moving] ** 2)))
+    if size < max(limit, _DEVIATIONS * error):
         return None
     factor = 2.0 * value("control.torque_constant")  # between nothing and all of the drag
     drag, low, high = (factor * end for end in _ends(size, error))
-    return Cause("bearing", "bearing.cage", "N m", PROBABILITY, drag, (low, high))
+    cause = Cause("bearing", "bearing.cage", "N m", 0.0, drag, (low, high))
+    return sign_of(cause, size, limit, moves=_OF_CAGE, text=_CLOSED, error=error)
 
 
 def _ends(size: float, error: float) -> tuple[float, float, float]:
@@ -347,7 +364,7 @@ def _sized(faults: Sequence[tuple[str, str]], ends: Sequence[float]) -> Cause:
     """Return a cause and those that look alike, its size as a share and interval read off a log."""
     size, low, high = ends
     places = tuple(FaultPlace(*other) for other in faults[1:])
-    return Cause(*faults[0], "1", PROBABILITY, size, (low, high), places)
+    return Cause(*faults[0], "1", 0.0, size, (low, high), places)
 
 
 def _cause(
@@ -361,4 +378,4 @@ def _cause(
     """Return a cause that is there or not, or whose size no log tells."""
     size = 1.0 if there else math.nan
     places = tuple(FaultPlace(*other) for other in others)
-    return Cause(kind, place, unit, PROBABILITY, size, (size, size), places)
+    return Cause(kind, place, unit, 0.0, size, (size, size), places)

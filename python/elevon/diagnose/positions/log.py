@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 
 Bools = npt.NDArray[np.bool_]
-#: Unknown and instants to the phase [rad] and what the unknown does to it.
-Phase = Callable[[float, Floats], tuple[Floats, Floats]]
 _TAU = 2.0 * math.pi
 _SMALL = 0.02  # RMS of the misfit over the spread, above which the note does not explain the log
 _STEPS = 8  # of Gauss and Newton
@@ -77,27 +75,27 @@ def noted_command(log: Log, limit: float) -> NotedWaveform | None:
         return None
     if note.waveform == "sine":
         frequency = known.get("frequency", 0.0)
-        return _solved(log, inside, frequency, _sine) if frequency * log.duration > 0.5 else None
-    sweep = known.get("sweep_time", 0.0)
-    if not sweep > 0.0 or not {"start_frequency", "end_frequency"} <= known.keys():
+        return _solved(log, inside, frequency, {}) if frequency * log.duration > 0.5 else None
+    if not known.get("sweep_time", 0.0) > 0.0:
         return None
-    phase = _chirp(known["start_frequency"], known["end_frequency"], sweep)
-    return _solved(log, inside, _scanned(log, inside, phase), phase)
+    if not {"start_frequency", "end_frequency"} <= known.keys():
+        return None
+    return _solved(log, inside, _scanned(log, inside, known), known)
 
 
-def _sine(frequency: float, time: Floats) -> tuple[Floats, Floats]:
-    return _TAU * frequency * time, _TAU * time
+def _phase(unknown: float, time: Floats, sweep: Mapping[str, float]) -> tuple[Floats, Floats]:
+    """Return the phase [rad] at instants, and what the unknown does to it.
 
-
-def _chirp(first: float, last: float, sweep: float) -> Phase:
-    rate = (last - first) / sweep
-
-    def phase(start: float, time: Floats) -> tuple[Floats, Floats]:
-        since = np.clip(time - start, 0.0, sweep)
-        slope = np.where((since > 0.0) & (since < sweep), -_TAU * (first + rate * since), 0.0)
-        return _TAU * (first + 0.5 * rate * since) * since, slope
-
-    return phase
+    The unknown is a sine's frequency [Hz]; where a sweep is noted, the instant [s] at which the
+    chirp starts.
+    """
+    if not sweep:
+        return _TAU * unknown * time, _TAU * time
+    first, seconds = sweep["start_frequency"], sweep["sweep_time"]
+    rate = (sweep["end_frequency"] - first) / seconds
+    since = np.clip(time - unknown, 0.0, seconds)
+    slope = np.where((since > 0.0) & (since < seconds), -_TAU * (first + rate * since), 0.0)
+    return _TAU * (first + 0.5 * rate * since) * since, slope
 
 
 def _columns(log: Log, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floats]:
@@ -105,36 +103,39 @@ def _columns(log: Log, turn: Floats, at: npt.NDArray[np.intp]) -> list[Floats]:
     return [np.sin(turn), np.cos(turn), np.ones(len(turn)), -ref, np.sign(ref)]
 
 
-def _scanned(log: Log, inside: Bools, phase: Phase) -> float:
+def _scanned(log: Log, inside: Bools, sweep: Mapping[str, float]) -> float:
     """Coarse search of the chirp's start, on samples behind the latest one allowed."""
     at = np.flatnonzero(inside & (log.time > _LATEST * log.duration))
     at = at[:: max(1, len(at) // _THIN)]
     target, costs = log.output[at], []
     starts = np.arange(0.0, _LATEST * log.duration, _SCAN)
     for start in starts:
-        rows = np.stack(_columns(log, phase(float(start), log.time[at])[0], at))
+        rows = np.stack(_columns(log, _phase(float(start), log.time[at], sweep)[0], at))
         right = rows @ target
         beta = np.linalg.lstsq(rows @ rows.T, right, rcond=1e-12)[0]
         costs.append(-float(beta @ right))
     return float(starts[int(np.argmin(costs))])
 
 
-def _solved(log: Log, inside: Bools, first: float, phase: Phase) -> NotedWaveform | None:
+def _solved(
+    log: Log, inside: Bools, first: float, sweep: Mapping[str, float]
+) -> NotedWaveform | None:
     """Gauss and Newton in the one unknown, first on the late half, then on all it explains."""
     value = first
     at = np.flatnonzero(inside & (log.time > 0.5 * log.duration))
     for final in (False, True):
         for _ in range(_STEPS):
-            beta, covariance, residual, step = _step(log, at, value, phase)
+            beta, covariance, residual, step = _step(log, at, value, sweep)
             value += step
         if not final:
             spread = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
-            at = _explained(log, np.flatnonzero(inside), phase(value, log.time)[0], beta, spread)
+            turn = _phase(value, log.time, sweep)[0]
+            at = _explained(log, np.flatnonzero(inside), turn, beta, spread)
     if len(at) < _LEAST or float(residual.std()) > _SMALL * float(np.std(log.output)):
         return None
     if not beta[3] > 0.0:
         return None
-    turn, _ = phase(value, log.time)
+    turn, _ = _phase(value, log.time, sweep)
     wave = beta[0] * np.sin(turn) + beta[1] * np.cos(turn) + beta[2]
     std = float(np.sqrt(max(covariance[3, 3], 0.0)))
     window = (float(log.time[at[0]]), float(log.time[at[-1]]))
@@ -142,10 +143,10 @@ def _solved(log: Log, inside: Bools, first: float, phase: Phase) -> NotedWavefor
 
 
 def _step(
-    log: Log, at: npt.NDArray[np.intp], value: float, phase: Phase
+    log: Log, at: npt.NDArray[np.intp], value: float, sweep: Mapping[str, float]
 ) -> tuple[Floats, Floats, Floats, float]:
     """Regression at one value of the unknown, and the step that its slope asks for."""
-    turn, slope = phase(value, log.time[at])
+    turn, slope = _phase(value, log.time[at], sweep)
     columns = _columns(log, turn, at)
     beta, _ = regress(columns, log.output[at])
     bend = slope * (beta[0] * columns[1] - beta[1] * columns[0])

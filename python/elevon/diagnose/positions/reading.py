@@ -14,7 +14,7 @@ import numpy as np
 from elevon.arrays import Floats
 from elevon.diagnose.engine.candidates import of_a_magnet
 from elevon.diagnose.engine.days import DAILY, moved_value
-from elevon.diagnose.engine.reading import Days, DrawnSignal, Reading, ReplayUnit
+from elevon.diagnose.engine.reading import Days, Reading, ReplayUnit, SignalPanel
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector
 from elevon.diagnose.positions.features import FEATURES, features_of
 from elevon.diagnose.positions.log import LONGEST, RUN_IN, prepared
@@ -208,19 +208,19 @@ class PositionReading(Reading):
         start = float(self.log.output[0]) * ratio + float(rng.uniform(-most, most))
         return ReplayUnit(Variant(values, tuple(faults), loads, {"motor_position": start}))
 
-    def drawn(self, units: Sequence[ReplayUnit]) -> list[DrawnSignal]:
-        """Return the log's signals that a page draws, each before those of units."""
+    def drawn(self, units: Sequence[ReplayUnit]) -> list[SignalPanel]:
+        """Return the log's signals that a page draws, each beside those of units."""
         sources = [self.log, *self._runs(units)]
         ratio, good = self.actuator.parameters.value("gear.ratio"), self.log.good
         return [
-            DrawnSignal(
-                "Difference of the two positions", "deg", [_gap(s, ratio) for s in sources]
+            SignalPanel(
+                "Difference of the two positions", "deg", *(_gap(s, ratio) for s in sources)
             ),
-            DrawnSignal("Torque current", "A", [s.current[good] for s in sources]),
-            DrawnSignal(
+            SignalPanel("Torque current", "A", *(s.current[good] for s in sources)),
+            SignalPanel(
                 "Motor speed",
                 "rpm",
-                [np.asarray(to_display(s.speed[good], "rpm")) for s in sources],
+                *(np.asarray(to_display(s.speed[good], "rpm")) for s in sources),
             ),
         ]
 

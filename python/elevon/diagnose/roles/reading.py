@@ -13,7 +13,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.diagnose.engine.days import daily, factors_of
-from elevon.diagnose.engine.reading import Days, DrawnSignal, Reading, ReplayUnit
+from elevon.diagnose.engine.reading import Days, Reading, ReplayUnit, SignalPanel
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector, deviations
 from elevon.diagnose.positions.plausibility import PLAUSIBLE, plausibility_of
 from elevon.diagnose.roles.numbers import (
@@ -394,14 +394,14 @@ class RoleReading(Reading):
         """The stated stiffness is seldom measured: its compliance is uncertain by its own size."""
         return [] if self.deflection is None else [ReplayUnit(compliant=not self._compliant)]
 
-    def drawn(self, units: Sequence[ReplayUnit]) -> list[DrawnSignal]:
-        """Return the log's signals that a page draws, each before those of units."""
+    def drawn(self, units: Sequence[ReplayUnit]) -> list[SignalPanel]:
+        """Return the log's signals that a page draws, each beside those of units."""
         sources: list[Mapping[str, Floats]] = [self.seen, *self._channels(units)]
         out = []
         for role in [r for r in _DRAWN if all(r in channels for channels in sources)][:3]:
             unit = display_unit(self.log.units[role])
             lines = [np.asarray(to_display(channels[role], unit)) for channels in sources]
-            out.append(DrawnSignal(role.replace("_", " ").capitalize(), unit, lines))
+            out.append(SignalPanel(role.replace("_", " ").capitalize(), unit, *lines))
         return out
 
     def same(self, other: Reading) -> bool:

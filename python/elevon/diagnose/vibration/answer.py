@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.diagnose.engine.answer import (
-    Cause,
-    Diagnosis,
-    Explanation,
-    FaultPlace,
-    Moved,
-    SuspectedFault,
-)
+from elevon.diagnose.engine.answer import Cause, Diagnosis, Explanation, FaultPlace, Moved
+from elevon.diagnose.signs import Sign, joined_signs
 from elevon.experiment import Experiment, Inputs, Variant
 from elevon.features.envelope import EnvelopeOrders, ball_passes, envelope_orders
 
@@ -211,10 +205,8 @@ def _quantiles(sizes: Floats, weights: Floats) -> list[float]:
     return [float(np.interp(q, share, sizes)) for q in _INTERVAL]
 
 
-def diagnose_spall(
-    logs: Sequence[Log], actuator: Actuator, false_alarm: float, *, alone: bool
-) -> tuple[Diagnosis | None, tuple[str, ...]]:
-    """Return the answer of an accelerometer, or None where it hears nothing, and the findings.
+def spall_sign(logs: Sequence[Log], actuator: Actuator, rate: float) -> tuple[Sign | None, str]:
+    """Return the sign of a spall, or None where the accelerometer hears none, and a finding.
 
     Parameters
     ----------
@@ -222,10 +214,8 @@ def diagnose_spall(
         Each with an accelerometer (`shows_passes`).
     actuator : Actuator
         The healthy unit.
-    false_alarm : float
-        Rate at which a healthy unit may be called spalled.
-    alone : bool
-        Whether nothing else looks at the logs: then healthy is an answer, too.
+    rate : float
+        At which a healthy unit may be called spalled.
 
     Raises
     ------
@@ -233,18 +223,44 @@ def diagnose_spall(
         A log without two turns in one direction.
     """
     readings = [PassReading(log, actuator) for log in logs]
-    heard = [(reading, reading.measured()) for reading in readings]
-    measured = [orders for _, orders in heard]
+    measured = [reading.measured() for reading in readings]
     evidence = evidence_of(measured)
-    if evidence.chance > false_alarm:
-        note = f"accelerometer: no spall (chance of noise alone {evidence.chance:.2g})"
-        return (_answer(heard, evidence, None, false_alarm, note) if alone else None), (note,)
+    if evidence.chance > rate:
+        return None, f"accelerometer: no spall (chance of noise alone {evidence.chance:.2g})"
     place = evidence.best
     simulated = [reading.simulated(place, _SIZES) for reading in readings]
     low, size, high = size_of(measured, simulated, place)
-    cause = Cause(KIND, place, "m", evidence.probabilities[place], size, (low, high),
-                  _ambiguous(evidence, place))  # fmt: skip
-    return _answer(heard, evidence, cause, false_alarm, _current(readings, place)), ()
+    probability = evidence.probabilities[place]
+    cause = Cause(KIND, place, "m", probability, size, (low, high), _ambiguous(evidence, place))
+    present = sum(evidence.probabilities.values())
+    note = _current(readings, place)
+    return Sign(cause, present, ("vibration",), note), note
+
+
+def diagnose_spall(logs: Sequence[Log], actuator: Actuator, rate: float) -> Diagnosis:
+    """Return the answer of an accelerometer alone; parameters as those of `spall_sign`.
+
+    Raises
+    ------
+    ValueError
+        A log without two turns in one direction.
+    """
+    sign, note = spall_sign(logs, actuator, rate)
+    heard = [(log, PassReading(log, actuator).measured()) for log in logs]
+    evidence = evidence_of([orders for _, orders in heard])
+    features = _features(heard, "" if sign is None else sign.cause.place)
+    if sign is not None:
+        joined = joined_signs(logs, [sign], rate, None)
+        findings = (*joined.findings, _ONLY)
+        return replace(joined, features=features, chance=evidence.chance, findings=findings)
+    share = sum(evidence.probabilities.values())
+    return Diagnosis(
+        logs=tuple(log.name for log in logs), status="healthy", p_fault=share, false_alarm=rate,
+        chance=evidence.chance, faults=(), best=(), p_best=1.0 - share, unobservable=(),
+        detectable={}, features=features, findings=(note, _ONLY), seconds=0.0,
+        hypotheses=(Explanation((), 1.0 - share),),
+        severity_units={f"{KIND}@{place}": "m" for place in evidence.scores},
+    )  # fmt: skip
 
 
 def _ambiguous(evidence: PassEvidence, place: str) -> tuple[FaultPlace, ...]:
@@ -255,52 +271,21 @@ def _ambiguous(evidence: PassEvidence, place: str) -> tuple[FaultPlace, ...]:
     )
 
 
-def _answer(
-    heard: Sequence[tuple[PassReading, EnvelopeOrders]],
-    evidence: PassEvidence,
-    cause: Cause | None,
-    false_alarm: float,
-    note: str,
-) -> Diagnosis:
-    share = sum(evidence.probabilities.values())
-    named = () if cause is None else (
-        SuspectedFault(KIND, cause.place, cause.severity, "m", cause.interval),
-    )  # fmt: skip
-    p_best = 1.0 - share if cause is None else cause.probability
-    return Diagnosis(
-        logs=tuple(reading.log.name for reading, _ in heard),
-        status="healthy" if cause is None else "faulty",
-        p_fault=share,
-        false_alarm=false_alarm,
-        chance=evidence.chance,
-        faults=() if cause is None else (cause,),
-        best=() if cause is None else (f"{KIND}@{cause.place}",),
-        p_best=p_best,
-        unobservable=(),
-        detectable={},
-        features=_features(heard, "" if cause is None else cause.place),
-        findings=(note, _ONLY),
-        seconds=0.0,
-        hypotheses=(Explanation(named, p_best),),
-        severity_units={f"{KIND}@{place}": "m" for place in evidence.scores},
-    )
-
-
 _ONLY = (
     "only the accelerometer was asked: for other faults diagnose the stand's slow logs, or give "
     "baselines of this test"
 )
 
 
-def _features(heard: Sequence[tuple[PassReading, EnvelopeOrders]], named: str) -> tuple[Moved, ...]:
+def _features(heard: Sequence[tuple[Log, EnvelopeOrders]], named: str) -> tuple[Moved, ...]:
     """The first line of each place, against noise."""
     rows = []
-    for reading, orders in heard:
+    for log, orders in heard:
         for place in orders.power:
             value, spread = float(orders.amplitudes(place)[0]), float(orders.deviations()[0])
             left = value if place == named else 0.0
             name = f"envelope at the passes of {place}"
-            rows.append(Moved(reading.log.name, name, "m/s2", value, 0.0, spread, left))
+            rows.append(Moved(log.name, name, "m/s2", value, 0.0, spread, left))
     return tuple(rows)
 
 
