@@ -105,8 +105,8 @@ def test_the_best_few_features_are_those_of_all_sets():
 
 def test_a_cause_that_a_feature_refutes_is_not_named():
     known, base = [(BACKLASH, 0.002)], [[1.0] * 5]
-    assert refuting([_case([1.2, 1, 1, 1, 1], base)], known) is None
-    assert refuting([_case([1.2, 1, 1, 1, 9.0], base)], known).feature == "speed_gain"
+    assert refuting(JoinedLogs((_case([1.2, 1, 1, 1, 1], base),)), known) is None
+    assert refuting(JoinedLogs((_case([1.2, 1, 1, 1, 9.0], base),)), known).feature == "speed_gain"
 
 
 def test_a_fault_may_move_a_number_that_the_model_leaves_alone_by_a_share_of_its_shift():

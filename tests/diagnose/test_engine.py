@@ -345,7 +345,7 @@ def test_severities_cover_what_was_drawn():
         ("gain_drift@control.position=-0.02", ("gain_drift@control.position",)),
         ("gain@sensor.current_b=0.15", ("gain@sensor.current_a",)),
         ("eccentricity_dynamic@motor=0.2", ("eccentricity_dynamic@motor",)),
-        ("tooth_wear@gear=0.002", ("tooth_wear@gear",)),
+        ("tooth_wear@gear=0.002 rad", ("tooth_wear@gear",)),
     ],
 )
 def test_on_the_high_model_with_another_drive(unit, tmp_path, fault, best):

@@ -41,7 +41,33 @@ def test_a_healthy_screw_of_another_make_is_never_given_a_cause(shared):
             seen.setdefault(len(base), Counter())[answer.status] += 1
             assert not answer.best
     print(seen)  # noqa: T201 - the counts are what it is for
-    assert set(seen[0]) | set(seen[1]) <= {"healthy", "model_does_not_fit", "refused"}
+    # Without a baseline and with a file that no log was calibrated to nothing is decided.
+    assert set(seen[0]) == {"undecided"}
+    assert set(seen[1]) <= {"healthy", "model_does_not_fit"}
+
+
+@pytest.mark.parametrize("load", [20, 40])
+def test_three_healthy_logs_of_a_real_screw_show_its_faults(shared, load):
+    """The file is of another make, so the logs alone decide: a fault is seen, never a cause named.
+
+    A spalled ball of the last stage moves the current at 20 kgf by 2 %, as days do: not asked here.
+    """
+    classes = ["normal", "lackLubrication2", "backlash2", *(["spalling8"] if load == 40 else [])]
+    logs = {
+        (name, run): log
+        for name, at, run, log in recordings(shared / "data" / "cranfield", *classes)
+        if at == load
+    }
+    base = [logs["normal", run] for run in (5, 6, 7)]
+    seen = {name: Counter() for name in classes}
+    for name in classes:
+        for run in (1, 2, 3, 4):
+            answer = elevon.diagnose(logs[name, run], "nasa-ballscrew", baselines=base)
+            assert not answer.best
+            seen[name][answer.status] += 1
+    print(seen)  # noqa: T201
+    assert seen["normal"]["healthy"] >= 3
+    assert all(seen[name] == {"unknown_fault": 4} for name in classes[1:])
 
 
 def test_real_classes_are_learnt_and_judged_by_runs_and_loads_left_out(shared):
