@@ -248,11 +248,11 @@ class Request:
         """
         if self.faults:
             return []
-        found = []
+        of_logs = []
         for log, item in zip(self.logs, items, strict=True):
             same = [b for b, x in zip(self.baselines, healthy, strict=True) if item.same(x)]
-            found.append(likely_signs(stand_signs(log, same)))
-        named = [signs for signs in found if signs]
+            of_logs.append(likely_signs(stand_signs(log, same)))
+        named = [signs for signs in of_logs if signs]
         return named[0] if 2 * len(named) > len(self.logs) else []
 
     @property

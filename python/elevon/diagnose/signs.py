@@ -131,7 +131,7 @@ def joined_signs(
     alike = 1.0 - absent - named
     keys = tuple(sign.key for sign in signs)
     units = {sign.key: sign.cause.unit for sign in signs}
-    found = tuple(_suspected(sign.cause) for sign in signs)
+    suspected = tuple(_suspected(sign.cause) for sign in signs)
     causes = tuple(sign.cause for sign in signs)
     findings = _findings(signs)
     if remaining is None:
@@ -139,11 +139,11 @@ def joined_signs(
             logs=tuple(log.name for log in logs), status="faulty", p_fault=1.0 - absent,
             false_alarm=rate, chance=absent, faults=causes, best=keys, p_best=named,
             unobservable=(), detectable={}, features=(), findings=findings, seconds=0.0,
-            hypotheses=(Explanation(found, named),), severity_units=units, p_other=alike,
+            hypotheses=(Explanation(suspected, named),), severity_units=units, p_other=alike,
         )  # fmt: skip
     clear = remaining.status in ("healthy", "faulty")
     left = () if clear else (f"of what is left, {remaining.headline}",)
-    sets = [(named, found, h) for h in remaining.hypotheses]
+    sets = [(named, suspected, h) for h in remaining.hypotheses]
     sets += [(absent, (), h) for h in remaining.hypotheses]
     every = [Explanation((*some, *h.faults), p * h.probability) for p, some, h in sets]
     likely = [h for h in every if h.probability >= POSSIBLE]
