@@ -19,14 +19,15 @@ EXTRAS = {
     "learn": ("sklearn",),
     "lives": ("lifelines",),
     "live": ("starlette", "uvicorn", "websockets"),
+    "measurements": ("asammdf", "mcap", "mcap_ros2", "nptdms"),
     "optimise": ("pymoo",),
     "progpy": ("progpy",),
     "query": ("duckdb", "polars"),
     "sampling": ("emcee",),
 }
 
-#: Extras that ``all`` leaves out: of studies and tests alone, under another licence, for queries.
-APART = frozenset({"fmu", "lives", "optimise", "progpy", "query", "sampling"})
+#: Extras that ``all`` leaves out: of studies and tests, other licences, other tools, for queries.
+APART = frozenset({"fmu", "lives", "measurements", "optimise", "progpy", "query", "sampling"})
 
 
 def missing_package(error: ModuleNotFoundError) -> str | None:

@@ -12,7 +12,6 @@ from elevon.calibrate.stages.closed_loop import calibrate_loop, loop_log, predic
 from elevon.calibrate.stages.closed_loop.fit import Fitted, Searched, choose, final_fit
 from elevon.calibrate.stages.closed_loop.free import asked_for, free_list
 from elevon.calibrate.stages.closed_loop.intervals import known
-from elevon.calibrate.stages.closed_loop.log import demand
 from elevon.calibrate.stages.closed_loop.model import LoopModel
 from elevon.calibrate.stages.closed_loop.predict import held_out_errors, validate_loop
 from elevon.calibrate.stages.closed_loop.refine import load_share, steps
@@ -20,6 +19,7 @@ from elevon.calibrate.stages.closed_loop.result import _alike, agreement, exchan
 from elevon.errors import InputError, UnknownNameError
 from elevon.estimate.free import Free, inner
 from elevon.estimate.lanes import LaneChannel, Lanes, Point
+from elevon.logs.command.curve import command_curve
 from elevon.logs.log import Log
 from elevon.plain import plain
 from tests.calibrate.linear import Linear, Logger, draw, log, square, sweep
@@ -63,9 +63,9 @@ def table(command):
 def test_a_step_of_the_demand_stays_a_step_and_a_slope_a_slope():
     time = 0.01 * np.arange(200)
     stepped = table(np.where(time < 1.0, 0.0, 0.03))
-    assert np.interp(0.9985, *demand(stepped)) == 0.0
+    assert np.interp(0.9985, *command_curve(stepped).points) == 0.0
     fast = table(0.012 * np.sin(2 * np.pi * 1.6 * time))
-    times, values = demand(fast)
+    times, values = command_curve(fast).points
     assert np.diff(times).min() > 0.003, "no jump"
     assert values == pytest.approx(0.012 * np.sin(2 * np.pi * 1.6 * times), abs=1e-6)
 
@@ -73,7 +73,7 @@ def test_a_step_of_the_demand_stays_a_step_and_a_slope_a_slope():
 def test_between_samples_the_demand_has_no_corners():
     """A derivative on the error would make of them a current that steps in time with the log."""
     time = 0.01 * np.arange(200)
-    times, values = demand(table(np.sin(10.0 * time)))
+    times, values = command_curve(table(np.sin(10.0 * time))).points
     bends = np.abs(np.diff(np.diff(values) / np.diff(times)))
     straight = np.abs(np.diff(np.diff(np.sin(10.0 * time)) / 0.01))
     assert np.max(bends) < 0.5 * np.max(straight)

@@ -18,7 +18,7 @@ from tests.contract import source
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = {"numpy", "pydantic", "rich", "typer", "elevon"}
-IMPORTED_AS = {"scikit-learn": "sklearn"}
+IMPORTED_AS = {"mcap-ros2-support": "mcap_ros2", "scikit-learn": "sklearn"}
 BROUGHT = {
     "cycler": "matplotlib",
     "dask": "distributed",

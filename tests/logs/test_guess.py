@@ -1,17 +1,22 @@
 """A first column map: from headers or their absence, units, and what integrates to what."""
 
+import html
 import json
 import math
+import re
 import tomllib
 
 import numpy as np
 import pytest
 
 from elevon.cli import main
+from elevon.errors import InputError, QuestionError
 from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.formats.table import RawTable
 from elevon.logs.importing import import_log
+from elevon.logs.maps.agreement import lag_of
 from elevon.logs.maps.guess import guess_map, role_hint, unit_hint
+from elevon.logs.read import imported_log, read_log
 
 LEAD = 5e-3  # m for one turn
 
@@ -64,10 +69,14 @@ HEADERS = {
 def test_a_linear_drive_is_recognised_and_its_map_imports(tmp_path, capsys, motion, header):
     log = written(tmp_path / "log.csv", motion, header)
     answer, stated = guessed(tmp_path, capsys, log)
+    # Without a header or a unit nothing tells a current from another effort: that is asked.
+    effort, unit = ("torque_current", "A") if header else ("effort", "1")
     assert [column["role"] for column in stated["column"]] == [
-        "time", "command", "output_position", "output_speed", "torque_current",
+        "time", "command", "output_position", "output_speed", effort,
     ]  # fmt: skip
-    assert [column["unit"] for column in stated["column"]] == ["ms", "mm", "mm", "mm/s", "A"]
+    assert [column["unit"] for column in stated["column"]] == ["ms", "mm", "mm", "mm/s", unit]
+    question = {"role": "effort", "candidates": ["torque_current", "effort"]}
+    assert (question in answer["questions"]) == (not header)
     assert all(column["reasons"] for column in answer["columns"])
     recording = import_log(log, column_map=tmp_path / "map.toml").recording
     np.testing.assert_allclose(
@@ -83,6 +92,49 @@ def test_a_motors_speed_shows_the_ratio(tmp_path, capsys, motion):
     assert roles["motor_speed"] == "rpm"
     assert roles["output_position"] == "mm"
     import_log(log, column_map=tmp_path / "map.toml")
+
+
+def benchmark():
+    """Columns as a public benchmark of robotics names them: a drive's command in no unit."""
+    t = np.arange(0.0, 12.0, 0.002)
+    goal, place = (0.1 * np.sin(2.0 * (x + 0.3 * np.sin(x))) for x in (t, t - 0.004))
+    speed = np.gradient(place, t)
+    force = 3.0 * np.gradient(speed, t) + 0.2 * np.sign(speed) + speed
+    rng = np.random.default_rng(5)
+    return {"t": t, "qg": goal, "qm": place + rng.normal(0.0, 1e-6, len(t)), "vir": force}
+
+
+def test_an_effort_that_is_no_current_is_asked_for_and_taken():
+    columns = benchmark()
+    with pytest.raises(QuestionError, match="what is 'vir'"):
+        read_log(columns)
+    with pytest.raises(QuestionError, match=r"in what unit is 'qm'.*output_position=qm \[UNIT\]"):
+        read_log(columns, roles={"effort": "vir"})
+    log = read_log(columns, roles={"effort": "vir [V]", "output_position": "qm [m]"})
+    assert {role: log.units[role] for role in log} == {
+        "command": "m", "output_position": "m", "effort": "V",
+    }  # fmt: skip
+    np.testing.assert_array_equal(log["effort"], columns["vir"])
+    as_current = read_log(
+        columns, roles={"torque_current": "vir [0.5 A]", "output_position": "qm [mm]"}
+    )
+    np.testing.assert_allclose(as_current.current, 0.5 * columns["vir"])
+    np.testing.assert_allclose(as_current.output, 1e-3 * columns["qm"])
+
+
+@pytest.mark.parametrize(
+    ("role", "answer", "message"),
+    [
+        ("effort", "vir [A]", "unit 'A'"),
+        ("effort", "vr [V]", "unknown column 'vr'"),
+        ("effrot", "vir", "unknown role 'effrot'"),
+        ("output_position", "qm [-1 mm]", "must be above 0"),
+        ("output_position", "qm [furlong]", "furlong"),
+    ],
+)
+def test_an_answer_that_cannot_be_is_refused(role, answer, message):
+    with pytest.raises(InputError, match=message):
+        read_log(benchmark(), roles={role: answer})
 
 
 def test_the_other_sign_is_seen(tmp_path, capsys, motion):
@@ -176,3 +228,47 @@ def test_a_command_that_steps_once_is_no_clock(tmp_path, capsys, motion):
     np.savetxt(path, rows, delimiter=",", header="a,b,position [mm],speed [mm/s]", comments="")
     answer, _ = guessed(tmp_path, capsys, path)
     assert [item["name"] for item in answer["columns"] if item["role"] == "time"] == ["b"]
+
+
+@pytest.mark.parametrize("late", [0.0, 0.006, -0.02])
+def test_a_channel_that_comes_later_is_reported_and_not_shifted(late):
+    """The lag is the one set: a position recorded later than its speed, or sooner."""
+    rng = np.random.default_rng(1)
+    t = np.arange(0.0, 12.0, 0.004)
+
+    def swing(x):
+        return 0.6 * np.sin(1.5 * x) + 0.2 * np.sin(4.4 * x + 0.5 * x**2 / 4.0)
+
+    speed = (swing(t + 1e-6) - swing(t - 1e-6)) / 2e-6 + rng.normal(0.0, 0.01, len(t))
+    place = swing(t - late) + rng.normal(0.0, 1e-4, len(t))
+    found, deviation = lag_of(t, place, speed)
+    assert found == pytest.approx(late, abs=max(4.0 * deviation, 0.02 * abs(late)))
+    assert deviation < 2e-4
+    columns = {"time [s]": t, "command [rad]": swing(t + 0.05), "output_position [rad]": place,
+               "output_speed [rad/s]": speed, "torque_current [A]": np.sign(speed)}  # fmt: skip
+    imported = imported_log(columns)
+    lags = [f for f in imported.report.findings if f.code == "lag"]
+    assert [f.place for f in lags] == (
+        [] if late == 0.0 else ["output_position" if late > 0.0 else "output_speed"]
+    )
+    assert np.array_equal(imported.recording.role("output_position").values, place)
+
+
+def test_a_report_draws_each_role_beside_its_reason(tmp_path, capsys, motion):
+    log = written(tmp_path / "log.csv", motion, HEADERS["units left out"])
+    page = tmp_path / "guess.html"
+    assert main(["import", str(log), "--guess", "--report", str(page)]) == 0
+    text = html.unescape(page.read_text())
+    guess = json_of(tmp_path, capsys, log)
+    sections = re.findall(r"<h2[^>]*>(.*?)</h2>", text, re.DOTALL)
+    for role in guess["roles"]:
+        assert role["role"] == "time" or any(role["role"] in heading for heading in sections)
+        assert role["role"] == "time" or role["reason"] in text
+    assert text.count('<section class="elevon-chart">') == len(guess["roles"]) - 1
+    assert f"{len(guess['questions'])} question" in text or not guess["questions"]
+
+
+def json_of(tmp_path, capsys, log):
+    capsys.readouterr()
+    assert main(["import", str(log), "--guess", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)

@@ -210,3 +210,31 @@ def test_to_arrow():
     assert table.column_names == ["time", "output_position", "motor_speed"]
     assert table.schema.field("motor_speed").metadata[b"unit"] == b"rad/s"
     assert table.num_rows == 400
+
+
+def test_build_copies_what_it_is_given_and_a_mask_becomes_missing_samples():
+    time, values = np.arange(5.0), np.arange(5.0)
+    masked = np.ma.masked_array(values.copy(), [0, 1, 0, 0, 0])
+    built = Recording.build(time, {"x": values, "y": masked}, {"x": "m", "y": "m"})
+    time[0], values[0] = -3.0, 9.0
+    assert built.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert built["x"].values[0] == 0.0
+    assert values.flags.writeable
+    assert np.isnan(built["y"].values).tolist() == [False, True, False, False, False]
+
+
+def test_a_mask_that_would_be_lost_is_refused():
+    hidden = np.ma.masked_array(np.arange(5.0), [0, 1, 0, 0, 0])
+    with pytest.raises(InputError, match="channel 'x': a mask hides 1 values"):
+        Channel("x", "m", hidden, Clock("main", np.arange(5.0)))
+    with pytest.raises(InputError, match="clock 'main': time: a mask hides 1 values"):
+        Recording.build(hidden, {"x": np.arange(5.0)}, {"x": "m"})
+
+
+def test_the_time_is_found_as_a_channel_and_as_instants():
+    one = Recording.build([0.0, 0.5], {"x": [1, 2]}, {"x": "rad"})
+    assert one["time"].to("ms").tolist() == [0.0, 500.0]
+    assert one["time"].values is one.time
+    other = Recording.build([0.0, 0.7], {"y": [1, 2]}, {"y": "rad"}, clock="slow")
+    with pytest.raises(InputError, match="2 clocks"):
+        one.joined(other)["time"]

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
+from elevon.logs.command.curve import CommandCurve, rebuilt_curve
 from elevon.plain import Plain
 from elevon.progress import Progress, part
 from elevon.report.checks import Check, verdict
@@ -253,10 +254,11 @@ def _predicted(
     state, assembly, profile, load = labels
     command, force = log.role("command"), log.role("load")
     time = np.asarray(command.time, dtype=np.float64)
+    curve = rebuilt_curve(time, np.asarray(command.values))
     scenario = Scenario.from_dict(
         {
             "duration": float(time[-1]),
-            "command": {"mode": "position", "terms": [_table(time, command.values)]},
+            "command": {"mode": "position", "terms": [_table(*curve.points)]},
             "load": {"output": {"terms": [_table(time, force.values)]}},
         }
     )
@@ -269,7 +271,7 @@ def _predicted(
     measured = np.asarray(log.role("torque_current").values, dtype=np.float64)
     used = time >= SETTLED
     error, size = predicted - measured, float(np.std(measured[used]))
-    between = used & ~_after_corners(time, np.asarray(command.values))
+    between = used & ~_after_corners(time, curve)
     rms, without = (float(np.sqrt(np.mean(error[at] ** 2))) for at in (used, between))
     row = CurrentRow(
         state, assembly, profile, load, 100.0 * rms / size, 100.0 * without / size, rms
@@ -281,15 +283,12 @@ def _predicted(
     return row, CurrentTrace(figure, title, time[used], measured[used], predicted[used])
 
 
-def _after_corners(time: Floats, command: Floats) -> npt.NDArray[np.bool_]:
-    """Tell which instants follow a corner: the slope jumps by more than a sine's does."""
-    slope = np.gradient(command, time)
-    jump = np.abs(np.diff(slope, prepend=slope[0])) > 0.2 * float(np.abs(slope).max())
-    corners = time[jump]
-    if not len(corners):
-        return np.zeros(len(time), dtype=bool)
-    since = time - corners[np.clip(np.searchsorted(corners, time, "right") - 1, 0, None)]
-    return np.asarray((since >= 0.0) & (since < CORNER))
+def _after_corners(time: Floats, curve: CommandCurve) -> npt.NDArray[np.bool_]:
+    """Tell which instants follow a corner of the command within `CORNER`."""
+    after = np.zeros(len(time), dtype=bool)
+    for corner in curve.breaks:
+        after |= (time >= corner.time) & (time < corner.time + CORNER)
+    return after
 
 
 def _recorded(time: Floats, values: Floats, cutoff: float) -> Floats:

@@ -282,6 +282,7 @@ def _error_row(error: SignalError, before: SignalError | None) -> dict[str, obje
         "Max": factor * error.largest,
         "RMS/RMS [%]": error.of_rms,
         "RMS/range [%]": error.of_range,
+        "Away from corners [%]": error.of_rms_away,
         "Max/range [%]": error.largest_of_range,
         **({"RMS before": factor * before.rms} if before else {}),
     }

@@ -14,6 +14,7 @@ from elevon.calibrate.kinematics import command_fit
 from elevon.errors import InputError, Interrupted, unknown
 from elevon.experiment import Experiment, Inputs
 from elevon.experiment.experiment import Table
+from elevon.logs.command.curve import CommandCurve, command_curve, rebuilt_curve
 from elevon.logs.command.note import align_noted
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.drive import drive_log
@@ -54,6 +55,9 @@ class SignalError(Plain):
         Maximum error in percent of the range.
     limit : float or None
         Largest `of_range` allowed by the actuator file.
+    of_rms_away : float or None
+        As `of_rms`, without what lies within 20 ms of a corner or step of the command; None where
+        it has none.
     """
 
     log: str
@@ -65,6 +69,9 @@ class SignalError(Plain):
     of_range: Annotated[float, key("rms_percent_of_range"), in_unit("%")]
     largest_of_range: Annotated[float, key("max_percent_of_range"), in_unit("%")]
     limit: Annotated[float | None, key("limit_percent_of_range"), in_unit("%")]
+    of_rms_away: Annotated[
+        float | None, key("rms_percent_of_rms_away_from_corners"), in_unit("%")
+    ] = None
 
     COMPUTED: ClassVar = ("passed",)
 
@@ -82,20 +89,25 @@ class SignalError(Plain):
 
 @dataclass(frozen=True)
 class ValidationTrace(Plain):
-    """Measured and simulated signals of one log on its clock, for plots."""
+    """Measured and simulated signals of one log on its clock, for plots.
+
+    `about` marks what lies about a corner or step of the command; None where nothing does.
+    """
 
     log: str
     time: Floats
     measured: Mapping[str, Floats]
     simulated: Mapping[str, Floats]
     used: Bools
+    about: Bools | None = None
 
     @classmethod
     def of(cls, log: Log, run: Log, names: Mapping[str, str]) -> ValidationTrace:
         """Return a log beside a run of it, channels by role named as stated."""
         roles = [role for role in names if log.has(role) and run.has(role)]
         measured, simulated = ({names[r]: item[r] for r in roles} for item in (log, run))
-        return cls(log.name, log.time, measured, simulated, log.good)
+        curve = command_curve(log) if log.has("command") else None
+        return cls(log.name, log.time, measured, simulated, log.good, about_breaks(curve, log))
 
     def errors(
         self,
@@ -117,13 +129,26 @@ class ValidationTrace(Plain):
                 100.0 * value / size if size > 0.0 else float("nan")
                 for value, size in ((rms, about), (rms, reach), (largest, reach))
             )
+            away = None if self.about is None else ~self.about[mask]
             rows.append(
                 SignalError(
                     self.log, name, units[name], rms, largest, of_rms, of_range,
-                    largest_of_range, (limits or {}).get(name),
+                    largest_of_range, (limits or {}).get(name), _share_of(error, data, away),
                 )
             )  # fmt: skip
         return rows
+
+
+def _share_of(error: Floats, data: Floats, away: Bools | None) -> float | None:
+    """Return the RMS error of some samples in percent of the data's RMS there about its mean."""
+    if away is None or not away.any() or not float(np.std(data[away])) > 0.0:
+        return None
+    return 100.0 * float(np.sqrt(np.mean(error[away] ** 2)) / np.std(data[away]))
+
+
+def about_breaks(curve: CommandCurve | None, log: Log) -> Bools | None:
+    """Return which samples of a log lie about a corner or step of its command; None: none does."""
+    return curve.about_breaks(log.time) if curve is not None and curve.breaks else None
 
 
 @dataclass(frozen=True)
@@ -280,12 +305,13 @@ def _trace(
     offsets: Mapping[str, float],
 ) -> tuple[ValidationTrace, str]:
     late, (experiment, how) = log.after(transient), bench_experiment(log, actuator, fidelity)
+    about = about_breaks(_command(log, actuator)[0], log)
     run = next(experiment.run()).seen(log)
     logged = (log.output, log.speed, log.current)
     measured = {
         name: values - offsets.get(name, 0.0) for name, values in zip(SIGNALS, logged, strict=True)
     }
-    return ValidationTrace(log.name, log.time, measured, run.channels, late.good), how
+    return ValidationTrace(log.name, log.time, measured, run.channels, late.good, about), how
 
 
 def bench_experiment(
@@ -329,7 +355,7 @@ def bench_experiment(
     shift = float(log.motor[0])
     middle = shift / ratio
     inputs = Inputs(
-        log.duration, "position", (log.time, command), loads={"brake": brake, **(loads or {})},
+        log.duration, "position", command.points, loads={"brake": brake, **(loads or {})},
         initial={
             "motor_position": shift,
             "motor_speed": float(log.speed[0]),
@@ -366,7 +392,7 @@ def _start(log: Log, offset: float, middle: float, actuator: Actuator) -> float:
     return float(np.clip(first, middle - half, middle + half))
 
 
-def _command(log: Log, actuator: Actuator) -> tuple[Floats, str]:
+def _command(log: Log, actuator: Actuator) -> tuple[CommandCurve, str]:
     """The command: a waveform where one explains the set point, else the trace itself.
 
     Where the set point is held at its limit the trace is not known; the waveform fills it, or a
@@ -382,11 +408,12 @@ def _command(log: Log, actuator: Actuator) -> tuple[Floats, str]:
         )
     if log.note is not None and log.note.command is not None and log.note.command.terms:
         noted = align_noted(trace, log.note)
-        return noted.values, f"as noted, from {noted.start:.4g} s"
+        return rebuilt_curve(log.time, noted.values), f"as noted, from {noted.start:.4g} s"
     known = np.interp(log.time, log.time[trace.valid], trace.position[trace.valid])
     fit = command_fit(log, gain, limit)
     if fit is None:
-        return known, "rebuilt from set point and position"
+        return CommandCurve(log.time, known), "rebuilt from set point and position"
     inside = (log.time >= fit.waveform.window[0]) & (log.time <= fit.waveform.window[1])
     saturated = ~trace.valid & (log.time <= fit.waveform.window[1])
-    return np.where(inside | saturated, fit.values, known), f"{fit.waveform.kind} fitted to the log"
+    wave = np.where(inside | saturated, fit.values, known)
+    return rebuilt_curve(log.time, wave), f"{fit.waveform.kind} fitted to the log"

@@ -126,6 +126,8 @@ def live(
     out: Annotated[Path, Option(metavar="DIR")] = Path(),
     hide_truth: bool = False,
     map_: Annotated[Path | None, Option("--map")] = None,
+    drive: str | None = None,
+    role: list[str] | None = None,
     model: Annotated[str, Option(metavar="ACTUATOR")] = "torino-rotary",
     static: Annotated[Path | None, Option(metavar="DIR")] = None,
     picture: Path | None = None,
@@ -166,8 +168,13 @@ def live(
     """
     common.check_outputs([static / "index.html" if static else None, picture], force=force)
     bench: LiveBench | LogReplay
-    if map_ is not None or _is_log(actuator):
-        bench = _replay(Path(actuator), model, settings, map_, factor)
+    if map_ is not None or drive or role or _is_log(actuator):
+        from elevon.live.replay import LogReplay
+
+        bench = LogReplay.of_file(
+            Path(actuator), common.read_actuator(model, settings), column_map=map_, factor=factor,
+            drive=drive, roles=common.roles_said(role),
+        )  # fmt: skip
     else:
         bench = _bench(
             str(calibrated or actuator), settings, fidelity=fidelity, seed=seed, factor=factor,
@@ -179,15 +186,6 @@ def live(
         _picture(bench, picture, force=force)
     else:
         _serve(bench, port, host, browser=not no_browser)
-
-
-def _replay(
-    log: Path, model: str, settings: list[str] | None, column_map: Path | None, factor: float
-) -> LogReplay:
-    from elevon.live.replay import LogReplay
-
-    actuator = common.read_actuator(model, settings)
-    return LogReplay.of_file(log, actuator, column_map=column_map, factor=factor)
 
 
 def _page(bench: LiveBench | LogReplay, folder: Path, *, force: bool) -> None:

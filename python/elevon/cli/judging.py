@@ -102,17 +102,20 @@ def validate(result: Validation) -> None:
             *quantity_text(e.largest, e.unit, 4),
             f"{e.of_rms:.3g}",
             f"{e.of_range:.3g}",
+            "" if e.of_rms_away is None else f"{e.of_rms_away:.3g}",
             "" if e.limit is None else f"{e.limit:.3g}",
             "" if e.passed is None else "pass" if e.passed else "FAIL",
         )
         for e in result.errors
     ]
-    columns = ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", "limit %", "")
-    print_table(columns, rows)
+    away = "% away"
+    columns = ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", away, "limit %", "")
+    print_table(columns, rows, optional=(away,))
     listed([_sensor_text(name, offset) for name, offset in result.offsets.items()])
     answer(
         "% of RMS: RMS error over the logged signal's RMS about its mean; "
-        f"% of range: over its range; after {result.transient:g} s"
+        f"% of range: over its range; {away}: % of RMS without the 20 ms about corners "
+        f"and steps of the command; after {result.transient:g} s"
     )
     listed([f"{name}: {text}" for name, text in result.notes.items()])
 

@@ -93,8 +93,10 @@ class LogReplay:
         *,
         column_map: Path | None = None,
         factor: float = 1.0,
+        drive: str | None = None,
+        roles: Mapping[str, str] | None = None,
     ) -> LogReplay:
-        """Read a log with its map, or a recording.
+        """Read a log with its map or what its guess asks, or a recording; as `read_log`.
 
         Raises
         ------
@@ -103,7 +105,8 @@ class LogReplay:
         """
         from elevon.logs.read import read_log
 
-        return cls(read_log(path, column_map), actuator, factor=factor)
+        log = read_log(path, column_map, drive=drive, roles=roles)
+        return cls(log, actuator, factor=factor)
 
     def start(self) -> None:
         """Begin."""

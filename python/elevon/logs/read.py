@@ -248,7 +248,7 @@ def as_logs(given: LogsLike) -> list[Log]:
 #: Roles that a motion is judged by: one of each is enough to leave the headers as they are.
 _ENOUGH = (
     ("command", "speed_ref"),
-    ("torque_current", "current_ref"),
+    ("torque_current", "current_ref", "effort"),
     ("output_position", "motor_position", "motor_speed", "output_speed"),
 )
 

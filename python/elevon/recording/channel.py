@@ -124,6 +124,13 @@ class Clock:
         """Last instant before and first instant after each gap, in s."""
         return [(float(self.time[k]), float(self.time[k + 1])) for k in self.gaps]
 
+    @property
+    def instants(self) -> Channel:
+        """Its time as a channel, ``time`` in s."""
+        channel = object.__new__(Channel)
+        channel.__dict__.update(name="time", unit="s", values=self.time, clock=self, text="time")
+        return channel
+
     def equals(self, other: Clock) -> bool:
         """Return whether two clocks are the same, to the last bit of time."""
         same = (self.name, self.rate, self.gaps) == (other.name, other.rate, other.gaps)
@@ -131,7 +138,16 @@ class Clock:
 
 
 def frozen(values: object, place: str) -> Floats:
-    """Return values as a read-only float64 vector, without copying one that already is."""
+    """Return values as a read-only float64 vector, without copying one that already is.
+
+    Raises
+    ------
+    InputError
+        No numbers, more than one dimension, or a mask that hides values.
+    """
+    if np.ma.is_masked(values):
+        hidden = int(np.sum(np.ma.getmaskarray(np.ma.asarray(values))))
+        raise InputError(f"{place}: a mask hides {hidden} values; NaN says that one is missing")
     if type(values) is np.ndarray and values.dtype is _FLOAT and values.ndim == 1:
         vector = values.view() if values.flags.writeable else values
         vector.flags.writeable = False
@@ -321,7 +337,14 @@ class ChannelSet:
         """The channels, in recorded order."""
         return list(self._channels.values())
 
+    @property
+    def time(self) -> Floats:
+        """Instants of the only clock [s], shape (n,); `InputError` where there are several."""
+        return self.clock().time
+
     def __getitem__(self, name: str) -> Channel:
+        if name == "time":
+            return self.clock().instants
         try:
             return self._channels[name]
         except KeyError:

@@ -35,6 +35,13 @@ class _Later:
         return function.__get__(instance, owner)
 
 
+def _copied(values: npt.ArrayLike) -> npt.ArrayLike:
+    """Return a copy of values whose masked ones are NaN."""
+    if np.ma.is_masked(values):
+        return np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    return np.array(values)
+
+
 class Recording(ChannelSet):
     """Named channels on one or several clocks, with what is known about them.
 
@@ -105,7 +112,8 @@ class Recording(ChannelSet):
         time : array_like, shape (n,)
             Instants in s, strictly increasing, regular or not.
         values : mapping of str to array_like, shape (n,)
-            Channel name to values; NaN marks a missing sample.
+            Channel name to values, which are copied; NaN marks a missing sample, and what a mask
+            hides becomes one.
         units : mapping of str to str
             The unit of every channel; values are converted to SI.
         clock : str
@@ -133,8 +141,8 @@ class Recording(ChannelSet):
         missing = [name for name in values if name not in units]
         if missing:
             raise InputError(f"units: no unit for the channels {', '.join(missing)}")
-        base = Clock(clock, time, rate, gaps)
-        channels = [in_si(name, units[name], values[name], base) for name in values]
+        base = Clock(clock, np.ma.copy(time), rate, gaps)
+        channels = [in_si(name, units[name], _copied(values[name]), base) for name in values]
         return cls(channels, clocks=[base], meta=meta, labels=labels)
 
     @property

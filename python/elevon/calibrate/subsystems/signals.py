@@ -175,7 +175,7 @@ def scale_of(text: str | float, actuator: Actuator, unit: str) -> float:
     """
     number, _, stated = str(text).strip().partition(" ")
     top, _, bottom = stated.partition("/")
-    if bottom and unit and bottom.strip() != unit:
+    if bottom and unit not in {"", "1"} and bottom.strip() != unit:
         raise InputError(
             f"--set {SCALE}={text}: the effort that the logs have is in {unit}, not in {bottom}"
         )

@@ -20,13 +20,13 @@ from elevon.diagnose.positions.features import FEATURES, features_of
 from elevon.diagnose.positions.log import LONGEST, RUN_IN, prepared
 from elevon.diagnose.positions.plausibility import PLAUSIBLE, plausibility_of
 from elevon.experiment import Experiment, Inputs, Variant
+from elevon.logs.command.curve import command_curve
 from elevon.simulate.prepare import solver_step
 from elevon.units import to_display
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.logs.log import Log
-
 
 _SIGNALS: Mapping[str, str] = {
     "output_position": "encoder_position", "motor_position": "motor_position",
@@ -158,7 +158,7 @@ class PositionReading(Reading):
         inputs = Inputs(
             duration=log.duration,
             mode="position",
-            command=(log.time, log["command"]),
+            command=command_curve(log).points,
             loads={"brake": (brake.time, brake.level)} if brake.measured else {},
             initial={
                 "motor_position": output * self.actuator.parameters.value("gear.ratio"),

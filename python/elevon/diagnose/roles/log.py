@@ -13,6 +13,7 @@ from elevon.diagnose.engine.candidates import of_a_magnet
 from elevon.diagnose.roles.numbers import lines
 from elevon.diagnose.roles.reading import BEFORE, INPUTS, RoleReading, read_load
 from elevon.errors import InputError
+from elevon.logs.command.curve import CommandCurve, command_curve
 from elevon.logs.log import Log, bridged, on_clock
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def aligned(
     InputError
         As `role_log`.
     """
-    log, lost = complete(log)
+    raw, (log, lost) = log, complete(log)
     time, name = log.time, log.name
     first = _onset(time, log["command"], sequence=sequence, name=name)
     rate = 1.0 / float(np.median(np.diff(time)))
@@ -78,13 +79,23 @@ def aligned(
     clock = np.arange(-round(BEFORE * rate), round(seconds * rate) + 1) / rate
     at = np.clip(clock + first, time[0], time[-1])
     channels = {r: on_clock(time, v, at, log.units[r]) for r, v in log.channels.items()}
+    begin = log.start + first
+    if not sequence:
+        channels["command"] = _from_onset(raw, begin).at(clock)
     _check_motion(channels, name)
     findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
     if until is None and time[-1] - first > _LONGEST * (1.0 + _LADDER):
         findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
     good = np.ones(len(clock), dtype=np.bool_)
-    ready = replace(log, time=clock, channels=channels, good=good, recording=None)
+    ready = replace(log, time=clock, channels=channels, good=good, recording=None, start=begin)
     return ready, seconds, findings
+
+
+def _from_onset(raw: Log, begin: float) -> CommandCurve:
+    """Return the command of a log with its corners, in instants counted from the file's `begin`."""
+    log = raw.on("command")
+    curve = command_curve(log)
+    return replace(curve, time=curve.time + (log.start - begin))
 
 
 def complete(log: Log) -> tuple[Log, list[str]]:
@@ -210,7 +221,7 @@ def _reading(
         ready,
         1.0 / float(log.time[1] - log.time[0]),
         seconds,
-        _command_of(log.time, log["command"], sequence=bool(actions)),
+        _actions_of(log) if actions else _lines_of(_from_onset(raw, log.start), log.time),
         actions,
         load,
         stroke,
@@ -222,12 +233,19 @@ def _reading(
     )
 
 
-def _command_of(time: Floats, command: Floats, *, sequence: bool) -> tuple[Floats, Floats]:
-    if sequence:
-        level = np.rint(command)
-        turns = np.concatenate(([0], np.flatnonzero(np.diff(level)) + 1))
-        return time[turns], level[turns]
-    return lines(time, command, _EXACT * float(np.ptp(command)))
+def _actions_of(log: Log) -> tuple[Floats, Floats]:
+    """Return the instants at which actions are commanded, and their numbers."""
+    level = np.rint(log["command"])
+    turns = np.concatenate(([0], np.flatnonzero(np.diff(level)) + 1))
+    return log.time[turns], level[turns]
+
+
+def _lines_of(command: CommandCurve, clock: Floats) -> tuple[Floats, Floats]:
+    """Return straight lines of a command over a clock, corners and steps among their ends."""
+    inside = (command.time > clock[0]) & (command.time < clock[-1])
+    time = np.concatenate(([clock[0]], command.time[inside], [clock[-1]]))
+    values = command.at(time)
+    return lines(time, values, _EXACT * float(np.ptp(values)))
 
 
 def _initial(

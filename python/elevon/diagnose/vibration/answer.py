@@ -13,12 +13,12 @@ from elevon.diagnose.engine.answer import Cause, Diagnosis, Explanation, FaultPl
 from elevon.diagnose.signs import Sign, joined_signs
 from elevon.experiment import Experiment, Inputs, Variant
 from elevon.features.envelope import EnvelopeOrders, ball_passes, envelope_orders
+from elevon.logs.command.curve import command_curve
 
 if TYPE_CHECKING:
     from elevon.actuator import Actuator
     from elevon.features.envelope import EnvelopeOrders
     from elevon.logs.log import Log
-
 
 KIND = "spall"
 NEEDED = ("vibration", "motor_position", "command")
@@ -80,7 +80,7 @@ class PassReading:
             {"output": (log.time, _averaged(log["load"], log.period))} if log.has("load") else {}
         )
         inputs = Inputs(
-            log.duration, "position", command=(log.time, log["command"]), loads=loads,
+            log.duration, "position", command=command_curve(log).points, loads=loads,
             initial=_begin(log, self.actuator),
         )  # fmt: skip
         stand = {**log.stand.parameters, "vibration.model": "resonance"}

@@ -5,16 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 
 from elevon.containers.hdf import is_hdf5
-from elevon.errors import unknown
+from elevon.errors import InputError, unknown
+from elevon.extras import missing_package
 from elevon.logs.formats.table import DEFAULT_LIMITS, Limits, RawTable, existing_file, head
 
 #: What `elevon import --format` takes.
-FORMATS = ("auto", "drive", "csv", "parquet", "netcdf", "mat", "recording", "cranfield")
+FORMATS = (
+    "auto", "drive", "csv", "parquet", "netcdf", "mat", "mdf", "tdms", "mcap", "recording",
+    "cranfield",
+)  # fmt: skip
+
+
+_MARKS = {b"MDF ": "mdf", b"UnFinMF ": "mdf", b"TDSm": "tdms", b"\x89MCAP0\r\n": "mcap"}
 
 
 def file_kind(path: Path) -> str:
-    """Return ``parquet``, ``netcdf``, ``mat`` or ``csv`` from a file's first bytes."""
+    """Return the format of `FORMATS` that a file's first bytes say; ``csv`` for any other."""
     first = head(path, 128)
+    for mark, kind in _MARKS.items():
+        if first.startswith(mark):
+            return kind
     if first.startswith(b"PAR1"):
         return "parquet"
     if first.startswith((b"CDF\x01", b"CDF\x02")):
@@ -63,6 +73,18 @@ def read_table(
         from elevon.logs.formats.vectors import read_matlab
 
         return read_matlab(file, limits=limits)
+    if kind in _MARKS.values():
+        from elevon.logs.formats import measurements
+
+        read = {
+            "mdf": measurements.read_mdf,
+            "tdms": measurements.read_tdms,
+            "mcap": measurements.read_mcap,
+        }
+        try:
+            return read[kind](file, limits=limits)
+        except ModuleNotFoundError as error:
+            raise InputError(f"{file}: {missing_package(error) or error}") from error
     from elevon.logs.formats.text import read_text_table
 
     header = True if log_format == "drive" else None

@@ -30,6 +30,10 @@ _EXPLAINED = 0.9  # share of the variance below which nothing is concluded
 _OFF = 0.15  # log of the factor by which an integral or a ratio may be off
 _FOLLOWS = math.log(2.0)  # a servo follows its command within this factor, where it follows
 _LEAST = 30  # samples
+_SHAFTS = (("output_position", "output_speed"), ("motor_position", "motor_speed"))
+_STRETCHES = 8  # whose lags are compared
+_CERTAIN = 4.0  # deviations of their mean: a lag that is stated
+_SHORTEST = 0.5  # of a sampling period: a shorter one is not stated
 
 
 def check_agreement(
@@ -78,6 +82,56 @@ def check_agreement(
                 "check unit, scale, sign and ratio of both columns"
             )
         report.say(role, "disagrees", text)
+    for place, rate in _SHAFTS:
+        if {place, rate} <= recording.roles.keys():
+            _lagging(recording, place, rate, report)
+
+
+def _lagging(recording: Recording, place: str, rate: str, report: ImportReport) -> None:
+    """Report by how much a position comes later than the speed of its shaft; nothing is shifted."""
+    position, speed = recording.role(place), recording.role(rate)
+    if position.clock is not speed.clock or len(position) < _STRETCHES * _LEAST:
+        return
+    lag, deviation = lag_of(position.time, position.values, speed.values)
+    period = float(np.median(np.diff(position.time)))
+    if abs(lag) > max(_CERTAIN * deviation, _SHORTEST * period):
+        first, second = (place, rate) if lag > 0.0 else (rate, place)
+        report.say(first, "lag", 1e3 * abs(lag), 1e3 * deviation, second)
+
+
+def lag_of(time: Floats, position: Floats, speed: Floats) -> tuple[float, float]:
+    """Return how much later than its speed a position was recorded, and the deviation [s].
+
+    Over each of eight stretches the position is the speed's integral less the speed times the lag.
+    Stretches with missing samples, at rest, or in which a position is something else say nothing.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        s.
+    position, speed : ndarray, shape (n,)
+        Of one shaft.
+
+    Returns
+    -------
+    lag, deviation : float
+        (0, inf) where fewer than three stretches show it.
+    """
+    lags = []
+    for part in np.array_split(np.arange(len(time)), _STRETCHES):
+        t, p, v = time[part] - time[part[0]], position[part], speed[part]
+        if not (np.isfinite(p).all() and np.isfinite(v).all() and np.ptp(v) > 0.0):
+            continue
+        turned = integral(t, v)
+        size = np.array([np.ptp(turned), np.ptp(v), 1.0, t[-1]])
+        design = np.column_stack((turned, v, np.ones(len(t)), t)) / size
+        fit, *_ = np.linalg.lstsq(design, p, rcond=None)
+        left = p - design @ fit
+        if fit[0] != 0.0 and float(np.var(left)) < (1.0 - _EXPLAINED) * float(np.var(p)):
+            lags.append(-float(fit[1] / size[1]) / float(fit[0] / size[0]))
+    if len(lags) < 3:
+        return 0.0, math.inf
+    return float(np.mean(lags)), float(np.std(lags, ddof=1) / math.sqrt(len(lags)))
 
 
 def slope_and_fit(x: Floats, y: Floats) -> tuple[float, float]:

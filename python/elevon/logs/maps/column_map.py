@@ -38,11 +38,13 @@ class LogSignal:
 _TABLES = packaged_toml("elevon.logs", "hints.toml")
 _TORQUES = ("motor_torque", "brake_torque", "load_torque")  # on the motor shaft
 _OF_THE_DRIVE = ("current_ref", "torque_current", "direct_current", "torque_voltage")
+#: What only logs have: a measured command of torque or force in any unit that is no current's.
+_EFFORT = LogSignal(("1", "V", "N m", "N"), role="effort")
 
 
 @lru_cache(maxsize=1)
 def known_roles() -> Mapping[str, LogSignal]:
-    """Return what a signal in each role is; ``time`` among them."""
+    """Return what a signal in each role is; ``time`` and ``effort`` among them."""
     from elevon import _core
 
     roles = {
@@ -55,7 +57,7 @@ def known_roles() -> Mapping[str, LogSignal]:
         )
         for role in _core.roles()
     }
-    return {"time": LogSignal(("s",)), **roles}
+    return {"time": LogSignal(("s",)), **roles, "effort": _EFFORT}
 
 
 @lru_cache(maxsize=1)

@@ -19,7 +19,7 @@ from elevon.arrays import Floats
 from elevon.data import packaged_toml
 from elevon.errors import FormatError, InputError, quoted, unknown
 from elevon.estimate.signals import integral
-from elevon.logs.formats.table import RawTable
+from elevon.logs.formats.table import RawTable, split_unit
 from elevon.logs.maps.agreement import evened, slope_and_fit
 from elevon.logs.maps.column_map import (
     drive_columns,
@@ -27,6 +27,7 @@ from elevon.logs.maps.column_map import (
     known_roles,
     known_signals,
     parameter_key,
+    unit_among,
 )
 from elevon.logs.maps.joint import (
     DOUBTFUL,
@@ -264,25 +265,33 @@ def guess_map(
     drive : str, optional
         Which of several drives in the file.
     answers : mapping of str to str, optional
-        Role to the column that has it, whatever the guess.
+        Role to the column that has it, whatever the guess; behind it in brackets its unit, or what
+        one of its numbers is: ``qm [m]``, ``pos [0.25 deg]``.
 
     Raises
     ------
     FormatError
         No column that could be the time.
     InputError
-        No such drive, no such column or role.
+        No such drive, column or role, or a unit that the role cannot have.
     """
     table, questions = _one_drive(table, drive)
-    answers = _checked(answers or {}, table)
+    given = {role: _answer(role, text, table) for role, text in (answers or {}).items()}
+    answers = {role: item.name for role, item in given.items()}
+    stated = {item.name: item for item in given.values() if item.unit}
+    table = replace(
+        table,
+        columns={n: v * stated[n].scale if n in stated else v for n, v in table.columns.items()},
+        units={**table.units, **{n: str(item.unit) for n, item in stated.items()}},
+    )
     columns = {
         name: GuessedColumn(name, unit=unit_hint(name, table.units.get(name, "")) or None)
         for name in table.columns
     }
     time = _time(table, columns)
-    for role, name in answers.items():
-        columns[name].role = role
-        columns[name].reasons.append("as you say")
+    for item in given.values():
+        columns[item.name].role, columns[item.name].scale = item.role, item.scale
+        columns[item.name].reasons.append("as you say")
     questions += _headers(time, columns, table, answers)
     joint = assign_roles(time, _joint_candidates(table, columns), _current_like(table, columns))
     questions += _settle_joint(joint, columns, answers)
@@ -290,7 +299,7 @@ def guess_map(
     motion = find_motion(time, _candidates(table, columns))
     _apply(motion, columns)
     if motion.position is not None:
-        _current(time, table, columns, motion)
+        questions += _effort(time, table, columns, motion)
     questions += _counts(time, table, columns) + _units(columns)
     return Guess(
         table.source, list(columns.values()), motion.gear_ratio, motion.travel_per_turn,
@@ -320,13 +329,27 @@ def _one_drive(table: RawTable, drive: str | None) -> tuple[RawTable, list[Quest
     return replace(table, columns=chosen_columns), [] if drive else [question]
 
 
-def _checked(answers: Mapping[str, str], table: RawTable) -> Mapping[str, str]:
-    for role, name in answers.items():
-        if role not in known_roles():
-            raise unknown("role", role, known_roles(), "--role")
-        if name not in table.columns:
-            raise unknown("column", name, table.columns, table.source)
-    return answers
+def _answer(role: str, text: str, table: RawTable) -> GuessedColumn:
+    """Return the column of an answer, ``COLUMN`` or ``COLUMN [SIZE]``, with its unit and scale."""
+    if role not in known_roles():
+        raise unknown("role", role, known_roles(), "--role")
+    if text in table.columns:
+        return GuessedColumn(text, role)
+    name, size = split_unit(text)
+    if name not in table.columns:
+        raise unknown("column", name, table.columns, table.source)
+    number, _, unit = size.partition(" ")
+    place = f"--role {role}={text}"
+    try:
+        scale = float(number)
+    except ValueError:
+        scale, unit = 1.0, size
+    if not (math.isfinite(scale) and scale > 0.0):
+        raise InputError(f"{place}: {size!r} must be above 0")
+    units = known_roles()[role].units
+    unit = drive_unit(unit or "1", units)
+    unit_among((*units, "m/s") if role == "motor_speed" else units, unit, place)
+    return GuessedColumn(name, role, unit, scale=scale)
 
 
 def _kind(item: GuessedColumn, stated: str) -> str:
@@ -380,12 +403,13 @@ def _swapped(columns: Mapping[str, GuessedColumn]) -> tuple[str, str] | None:
 
 
 def _current_like(table: RawTable, columns: Mapping[str, GuessedColumn]) -> dict[str, Floats]:
-    """Return the columns that may be a current: in ampere, or in no unit and of no other role."""
+    """Return the columns that may drive: in ampere, said to, or in no unit and of no other role."""
     chosen = {}
     for name, item in columns.items():
         values = table.columns[name]
         bare = not (item.unit or table.units.get(name, "").strip() or item.role)
-        if (bare or _is_current(item)) and np.isfinite(values).all() and not _is_state(values):
+        drives = item.role in _DRIVING or _is_current(item)
+        if (bare or drives) and np.isfinite(values).all() and not _is_state(values):
             chosen[name] = values
     return chosen
 
@@ -432,7 +456,10 @@ def _counts(time: Floats, table: RawTable, columns: Mapping[str, GuessedColumn])
             item.reasons.append(f"{turn} counts a turn, by the speed of {speed.name!r}")  # type: ignore[union-attr]
         else:
             item.unit = None
-            text = f"{quoted(name)} is in counts: say what one is in a column map (unit, scale)"
+            text = (
+                f"{quoted(name)} is in counts: say what one is, "
+                f"--role '{item.role}={name} [0.001 deg]'"
+            )
             questions.append(Question(item.role or "", ["rad", "rev", "mm"], text))
     return questions
 
@@ -614,12 +641,15 @@ def _apply(motion: MotionColumns, columns: Mapping[str, GuessedColumn]) -> None:
         item.reasons.extend(finding.reasons)
 
 
-def _current(
+def _effort(
     time: Floats, table: RawTable, columns: Mapping[str, GuessedColumn], motion: MotionColumns
-) -> None:
-    """Find the current among what is left: acceleration, friction and speed explain it."""
-    if any(item.role in {"torque_current", "current_ref"} for item in columns.values()):
-        return
+) -> list[Question]:
+    """Find what drives the motion among what is left: acceleration, friction and speed explain it.
+
+    Neither data nor a header without a unit tell a current from another effort: that is asked.
+    """
+    if any(item.role in _DRIVING for item in columns.values()):
+        return []
     speed = np.gradient(motion.smooth, time)
     size = float(np.std(speed)) or 1.0
     parts = np.column_stack((np.gradient(speed, time), np.tanh(10.0 * speed / size), speed))
@@ -627,20 +657,37 @@ def _current(
     for name, item in columns.items():
         values = table.columns[name]
         good = np.isfinite(values)
-        if item.role or good.sum() < 100 or not np.ptp(values[good]) > 0.0:
+        if item.role not in _PERHAPS or good.sum() < 100 or not np.ptp(values[good]) > 0.0:
             continue
-        if (item.unit or table.units.get(name, "").strip()) and not _is_current(item):
+        if not _unit_allows("effort", item, table.units.get(name, "")):
             continue
         design = np.column_stack((parts[good], np.ones(good.sum())))
         fit = design @ np.linalg.lstsq(design, values[good], rcond=None)[0]
         explained = slope_and_fit(fit, values[good])[1]
         if explained > most:
             best, most = item, explained
-    if best is not None:
-        best.role = "torque_current"
-        best.reasons.append(
-            f"acceleration, direction and speed explain {100 * most:.0f} % of it, as of a current"
-        )
+    if best is None:
+        return []
+    why = f"acceleration, direction and speed explain {100 * most:.0f} % of it, as of an effort"
+    if best.role is not None:
+        best.reasons.append(why)
+        return []
+    best.role = "effort"
+    best.reasons.append(why)
+    if best.unit and best.unit != "%":
+        return []
+    roles = ["torque_current", "effort"]
+    text = (
+        f"what is {quoted(best.name)}? a current: say --role torque_current={best.name!r}, in "
+        f"another unit than A what one of its numbers is: '{best.name} [0.01 A]'; any other "
+        f"effort: --role effort={best.name!r}, its unit in brackets behind it where it is known"
+    )
+    return [Question("effort", roles, text)]
+
+
+_DRIVING = frozenset({"torque_current", "current_ref", "effort", "torque_ref"})
+#: Roles that their units suggest, and none: each may be the effort of a log that has no other.
+_PERHAPS = frozenset({None, "torque_voltage", "load_cell"})
 
 
 def _units(columns: Mapping[str, GuessedColumn]) -> list[Question]:
@@ -653,7 +700,10 @@ def _units(columns: Mapping[str, GuessedColumn]) -> list[Question]:
     places = [c for c in columns.values() if c.role in (*_PLACES, "command")]
     assumed = [c for c in places if any("no speed to tell" in reason for reason in c.reasons)]
     for item in assumed:
-        text = f"in what unit is {quoted(item.name)}? say it in a column map (unit)"
+        text = (
+            f"in what unit is {quoted(item.name)}? say it behind its name, "
+            f"--role '{item.role}={item.name} [UNIT]'"
+        )
         questions.append(Question(item.role or "", ["m", "mm", "rad", "deg"], text))
     return questions
 

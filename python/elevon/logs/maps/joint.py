@@ -255,13 +255,16 @@ class _Terms:
         """How well a signal follows another: of its size, and later."""
         key = ("follows", ahead, behind)
         if key not in self._known:
-            if self.columns[ahead].kind != self.columns[behind].kind:
+            first, second = self.columns[ahead], self.columns[behind]
+            if first.kind and second.kind and first.kind != second.kind:
                 return -_CLOSE
             x, y = self.values[ahead], self.values[behind]
             later = max(self._shifted(ahead, behind, int(k)) for k in self.lags)
             now = slope_and_fit(x, y)[1]
             sooner = max(self._shifted(behind, ahead, int(k)) for k in self.lags)
             slope = slope_and_fit(x, y)[0]
+            if not (first.kind and second.kind):  # what states no unit has the other's
+                slope *= first.scale / second.scale
             score = _closeness(max(later, now, sooner))
             if not 1.0 / _SIZE < slope < _SIZE:
                 score = -_CLOSE

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from elevon.arrays import Floats
 from elevon.errors import InputError
@@ -33,9 +32,6 @@ CHANNELS = {
 }
 NAMES = {role: channel.name for role, channel in CHANNELS.items()}
 _FEWEST = 50  # samples
-_JUMP = 0.02  # of the demand's range within one sample, ...
-_BETWEEN = 3  # points of the demand a sample
-_ALONE = 5.0  # ... and so many times what changes beside it: a step, not a slope
 _NO_SIGN = -0.02  # of the largest current: below it a current has a sign
 
 
@@ -83,40 +79,6 @@ def recorded_roles(log: Log) -> list[str]:
 def sigma(log: Log, role: str) -> float:
     """Return the spread of a channel about its mean over the samples that count."""
     return float(np.nanstd(log[role][log.good]))
-
-
-@per_log
-def demand(log: Log) -> tuple[Floats, Floats]:
-    """The demand as points: a jump stays a jump, between jumps the slope is continuous.
-
-    Straight lines between samples would have a corner at each: a derivative on the error makes
-    of them a current that steps in time with the log, always seen at the same place.
-    """
-    command = log["command"]
-    size = np.abs(np.diff(command))
-    neighbour = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
-    jump = (size > _JUMP * float(np.ptp(command))) & (size > _ALONE * neighbour)
-    steps = np.flatnonzero(jump) + 1
-    stretches = np.split(np.arange(len(log.time)), steps)
-    ends = [*log.time[steps] - 1e-3 * np.diff(log.time)[steps - 1], None]
-    points = [_curve(log, k, end) for k, end in zip(stretches, ends, strict=True)]
-    return np.concatenate([p[0] for p in points]), np.concatenate([p[1] for p in points])
-
-
-def _curve(log: Log, k: npt.NDArray[np.intp], end: float | None) -> tuple[Floats, Floats]:
-    """Return points of a stretch without jumps, held until just before the jump at its end."""
-    from scipy.interpolate import Akima1DInterpolator
-
-    times, values = log.time[k], log["command"][k]
-    if len(k) > 2 and float(np.ptp(values)) > 0.0:
-        curve = Akima1DInterpolator(times, values)
-        share = np.arange(_BETWEEN) / _BETWEEN
-        fine = (times[:-1, None] + np.diff(times)[:, None] * share).ravel()
-        times = np.append(fine, times[-1])
-        values = curve(times)
-    if end is not None:
-        times, values = np.append(times, end), np.append(values, values[-1])
-    return times, values
 
 
 def window(log: Log, begin: float, end: float, settle: float) -> Log:

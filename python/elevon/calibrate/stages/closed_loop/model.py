@@ -9,9 +9,10 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.calibrate.model_runs import ModelRuns
 from elevon.calibrate.stages.closed_loop.free import STICK
-from elevon.calibrate.stages.closed_loop.log import CHANNELS, NAMES, demand, motion, unsigned
+from elevon.calibrate.stages.closed_loop.log import CHANNELS, NAMES, motion, unsigned
 from elevon.calibrate.stages.log import motor_ratio
 from elevon.experiment import Experiment, Inputs, Sensor, Variant
+from elevon.logs.command.curve import command_curve
 from elevon.logs.log import Log
 
 #: Role to the model's signal, the sensors' own; and first deviations, as shares of a channel's
@@ -70,7 +71,7 @@ class LoopModel(ModelRuns):
             initial["motor_speed"] = moving
         loads = {"output": (log.time, log["load"])} if log.has("load") else {}
         end = log.duration + 4.0 * log.period
-        return Inputs(end, "position", demand(log), loads=loads, initial=initial)
+        return Inputs(end, "position", command_curve(log).points, loads=loads, initial=initial)
 
     def _start(self, log: Log) -> float:
         """Where the output stood when the log began: as recorded, else as demanded."""
