@@ -117,9 +117,9 @@ def rebuilt_curve(time: Floats, values: Floats) -> CommandCurve:
     reach = float(np.ptp(values))
     for first, last in zip(starts, ends, strict=True):
         t, v = time[first:last], values[first:last]
-        found = _corners(t, v, reach)
-        breaks += [item for item, _ in found]
-        t, v = _smooth_between(t, v, found, reach)
+        corners = _corners(t, v, reach)
+        breaks += [item for item, _ in corners]
+        t, v = _smooth_between(t, v, corners, reach)
         if last < len(time):
             until = time[last] - _JUST_BEFORE * (time[last] - time[last - 1])
             t, v = np.append(t, until), np.append(v, v[-1])
@@ -154,14 +154,14 @@ def _corners(time: Floats, values: Floats, reach: float) -> list[tuple[CommandBr
     limit = max(_CLEAR * float(np.quantile(least, _COMMON)), _EXACT * reach)
     clean = (np.roll(left, 1) <= limit) & (np.roll(right, -1) <= limit)
     places = np.flatnonzero(clean & (np.maximum(left, right) > limit))
-    found: list[tuple[CommandBreak, float]] = []
+    corners: list[tuple[CommandBreak, float]] = []
     for i in (int(k) for k in places if 3 <= k < count - 4):
         corner = _intersection(time, values, i, limit)
         if corner is not None and not (
-            found and corner[0].time - found[-1][0].time < _near(time, i)
+            corners and corner[0].time - corners[-1][0].time < _near(time, i)
         ):
-            found.append(corner)
-    return found
+            corners.append(corner)
+    return corners
 
 
 def _near(time: Floats, i: int) -> float:

@@ -72,14 +72,16 @@ def read_mdf(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
             declared = sum(g.channel_group.cycles_nr * len(g.channels) for g in content.groups)
             limits.check_shape(str(file), int(declared), 1)
             for number, group in enumerate(content.groups):
-                found = ChannelGroup(str(group.channel_group.acq_name or f"group {number}"), None)
+                channels = ChannelGroup(
+                    str(group.channel_group.acq_name or f"group {number}"), None
+                )
                 for index, channel in enumerate(group.channels):
                     if channel.channel_type in _MASTERS:
                         continue
                     signal = content.get(group=number, index=index)
-                    found.time = np.asarray(signal.timestamps, dtype=np.float64)
-                    _add(found, channel.name, signal.samples, str(signal.unit or ""), notes)
-                yield found
+                    channels.time = np.asarray(signal.timestamps, dtype=np.float64)
+                    _add(channels, channel.name, signal.samples, str(signal.unit or ""), notes)
+                yield channels
 
     return _table(file, "mdf", groups, limits, notes)
 
@@ -101,11 +103,11 @@ def read_tdms(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
             for group in content.groups():
                 by_length: dict[int, ChannelGroup] = {}
                 for channel in group.channels():
-                    found = by_length.setdefault(len(channel), ChannelGroup(group.name, None))
-                    if found.time is None and "wf_increment" in channel.properties:
-                        found.time = np.asarray(channel.time_track(), dtype=np.float64)
+                    channels = by_length.setdefault(len(channel), ChannelGroup(group.name, None))
+                    if channels.time is None and "wf_increment" in channel.properties:
+                        channels.time = np.asarray(channel.time_track(), dtype=np.float64)
                     unit = str(channel.properties.get("unit_string", ""))
-                    _add(found, channel.name, channel[:], unit, notes)
+                    _add(channels, channel.name, channel[:], unit, notes)
                 yield from by_length.values()
 
     return _table(file, "tdms", groups, limits, notes)
@@ -150,10 +152,10 @@ def read_mcap(path: str | Path, *, limits: Limits = DEFAULT_LIMITS) -> RawTable:
         begin = min((times[0] for times, _ in topics.values()), default=0)
         for topic, (times, rows) in topics.items():
             names = dict.fromkeys(name for row in rows for name in row)
-            found = ChannelGroup(topic, 1e-9 * np.array([at - begin for at in times]))
+            channels = ChannelGroup(topic, 1e-9 * np.array([at - begin for at in times]))
             for name in names:
-                _add(found, name, np.array([row.get(name, np.nan) for row in rows]), "", notes)
-            yield found
+                _add(channels, name, np.array([row.get(name, np.nan) for row in rows]), "", notes)
+            yield channels
 
     return _table(file, "mcap", groups, limits, notes)
 
@@ -200,20 +202,20 @@ def _table(
 ) -> RawTable:
     """Return the table of a file's groups on the clock of the one with most samples."""
     try:
-        found = [group for group in groups() if group.rows > 0]
+        clocked = [group for group in groups() if group.rows > 0]
     except (FormatError, ModuleNotFoundError):
         raise
     except Exception as error:
         raise FormatError(f"{file}: damaged {file_format}: {quoted(str(error))}") from error
-    if not found:
+    if not clocked:
         raise FormatError(f"{file}: no channel of numbers")
-    base = max(found, key=lambda group: group.rows)
+    base = max(clocked, key=lambda group: group.rows)
     columns: dict[str, Floats] = {}
     units: dict[str, str] = {}
     if base.time is not None:
         columns[_CLOCK], units[_CLOCK] = base.time, "s"
-    for group in (base, *(g for g in found if g is not base)):
-        shared = {name for other in found if other is not group for name in other.columns}
+    for group in (base, *(g for g in clocked if g is not base)):
+        shared = {name for other in clocked if other is not group for name in other.columns}
         for name, values in group.columns.items():
             label = f"{group.name}/{name}" if name in shared or name in columns else name
             read = _on_base(group, values, base)
