@@ -30,7 +30,7 @@ def opened(run, live, **options):
     complaints = []
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("console", lambda line: complaints.append(line.text) if line.type == "error" else None)
-    page.goto(live.address)
+    page.goto(live.link)
     until(page, "window.elevonPage?.frames > 2")
     return page, complaints
 

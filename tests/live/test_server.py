@@ -1,14 +1,21 @@
 """What the server promises: its first line, /state, /act, its limits, who may speak to it."""
 
+import asyncio
 import json
+import os
+import re
+import signal
 import socket
+import struct
 import time
 
 import pytest
+from starlette.routing import Route
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from elevon.cli import main
+from elevon.live.app import Quiet
 from tests.live.browser import browser, needs_browser, opened, press, until
 from tests.live.serving import SINE, bench
 
@@ -24,12 +31,111 @@ def live(tmp_path_factory):
 
 
 def _socket(live, **options):
-    return connect(live.address.replace("http", "ws") + STREAM, compression=None, **options)
+    address = f"{live.address.replace('http', 'ws')}{STREAM}?token={live.token}"
+    return connect(address, compression=None, **options)
 
 
 def test_the_first_line_is_the_address(live):
-    assert live.line.startswith("live at http://127.0.0.1:")
-    assert live.line.endswith("/\n")
+    assert re.fullmatch(r"live at http://127\.0\.0\.1:\d+/\?token=[\w-]{22}\n", live.line)
+
+
+def test_the_first_line_is_json_where_that_is_asked_for(tmp_path):
+    with bench("--fidelity", "low", "--json", folder=tmp_path) as server:
+        about = json.loads(server.line)
+    assert about["url"].endswith(f"/?token={about['token']}")
+    assert (about["status"], len(about["token"])) == ("ok", 22)
+
+
+def test_without_the_token_nothing_is_told_or_done(live):
+    """Another account of a shared machine reaches the port as well."""
+    for path, data in (("state", None), ("model", None), ("act", {"record": True})):
+        assert live.request(path, data, token=False)[0] == 403
+        assert live.request(f"{path}?token=", data, token=False)[0] == 403
+        assert live.request(path, data, {"X-Elevon-Token": "x" * 22}, token=False)[0] == 403
+    assert live.request(f"state?token={live.token}", token=False)[0] == 200
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(live.address.replace("http", "ws") + STREAM, compression=None)
+
+
+def test_a_server_that_asks_for_no_token(tmp_path):
+    with bench("--fidelity", "low", "--no-token", folder=tmp_path) as server:
+        assert server.line.endswith("/\n")
+        assert server.request("state", token=False)[0] == 200
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        (b"Host: [::1", 400),
+        (b"Host: localhost\r\nOrigin: http://[", 400),
+        (b"Host: ]", 403),
+        (b"Host: \xff\xfe", 403),
+        (b"Host: localhost\r\nX-Elevon-Token: \xff", 403),
+    ],
+)
+@pytest.mark.parametrize("path", ["state", "stream", ""])
+def test_malformed_heads_are_refused_without_an_error(live, head, status, path):
+    if path == "" and b"Token" in head:
+        status = 200  # the page itself holds nothing
+    assert _raw(live, f"GET /{path} HTTP/1.1".encode(), head) == status
+
+
+@pytest.mark.parametrize("path", ["page/{}.js", "files/{}", "page/%00.js", "page/..%2f{}.js", "{}"])
+def test_paths_that_lead_nowhere(live, path):
+    head = f"Host: localhost\r\nX-Elevon-Token: {live.token}".encode()
+    line = f"GET /{path.format('a' * 5000)} HTTP/1.1".encode()
+    assert _raw(live, line, head) == 404
+
+
+def _raw(live, line, head):
+    place = ("127.0.0.1", int(live.address.rstrip("/").rpartition(":")[2]))
+    with socket.create_connection(place, timeout=30) as peer:
+        peer.sendall(line + b"\r\n" + head + b"\r\n\r\n")
+        return int(peer.recv(4096).split()[1])
+
+
+def test_viewers_that_vanish_leave_no_line(tmp_path):
+    """Connections that are reset while a picture is on its way: stderr stays empty."""
+    with bench("--fidelity", "low", folder=tmp_path) as server:
+        sockets = [_socket(server) for _ in range(12)]
+        for viewer in sockets:
+            _viewer(viewer)
+            linger = struct.pack("ii", 1, 0)  # closing resets the connection
+            viewer.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+            os.close(viewer.socket.detach())
+        server.until(lambda state: state["control"]["viewers"] == 0)
+        assert server.request("state")[0] == 200
+        server.process.send_signal(signal.SIGINT)
+        assert "Traceback" not in (text := server.process.stderr.read())
+        assert "Exception" not in text
+
+
+def test_an_error_of_ours_is_a_line_and_no_traceback(caplog):
+    """A planted error in a handler: status 500, one line on the log."""
+
+    async def broken(_):
+        raise KeyError("planted")
+
+    async def receive():
+        return {"type": "http.request", "body": b""}
+
+    async def send(message):
+        sent.append(message)
+
+    sent = []
+    scope = {"type": "http", "method": "GET", "path": "/broken", "headers": [], "query_string": b""}
+    asyncio.run(Quiet([Route("/broken", broken)])(scope, receive, send))
+    assert sent[0]["status"] == 500
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == [
+        "live: http '/broken': KeyError: 'planted'"
+    ]
+    assert all(record.exc_info is None for record in caplog.records)
+
+
+@pytest.mark.parametrize("act", ["record", "save", "repeat", "restart"])
+def test_no_step_of_a_script_writes_files(live, act):
+    status, answer = live.act(repeat=[{"time": 0.0, act: True}])
+    assert (status, answer["error"][:15]) == (400, "repeat: step 0:")
 
 
 def test_a_port_that_is_taken_is_wrong_input(live, capsys):
@@ -182,8 +288,6 @@ def test_one_viewer_at_a_time_has_control(live):
 
 
 def test_snapshots_hold_the_signals_that_were_chosen(live):
-    import struct
-
     with _socket(live) as one:
         _viewer(one)
         one.send(json.dumps({"watch": ["motor_speed", "none", "command"], "choice": 7}))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from elevon.cli import common, interrupt
 from elevon.cli.groups import group
-from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 from elevon.cli.shell import Answer, DoorCall, add_plain, command
 from elevon.errors import InputError
 from elevon.files import write_text
@@ -122,6 +123,7 @@ def live(
     port: Annotated[int, Option(min=0, max=65535)] = 8484,
     host: str = "127.0.0.1",
     no_browser: bool = False,
+    no_token: bool = False,
     factor: Annotated[float, Option(min=0.1, max=100.0)] = 1.0,
     out: Annotated[Path, Option(metavar="DIR")] = Path(),
     hide_truth: bool = False,
@@ -134,6 +136,7 @@ def live(
     force: bool = False,
     seed: int = 0,
     settings: list[str] | None = None,
+    as_json: bool = False,
 ) -> None:
     """Show an actuator at real time in the browser: move it, break it, watch it being found out.
 
@@ -148,9 +151,11 @@ def live(
     port : int
         0: a free one.
     host : str
-        Address to listen on; not loopback: a token is needed.
+        Address to listen on.
     no_browser : bool
         Open no page.
+    no_token : bool
+        Let everybody who reaches the address act and record.
     factor : float
         Simulated over wall time.
     out : path
@@ -180,37 +185,36 @@ def live(
             str(calibrated or actuator), settings, fidelity=fidelity, seed=seed, factor=factor,
             out=out, baselines=baseline or [], mission=mission, hide_truth=hide_truth,
         )  # fmt: skip
-    if static is not None:
-        _page(bench, static, force=force)
-    elif picture is not None:
-        _picture(bench, picture, force=force)
+    if static is not None or picture is not None:
+        paths = _written(bench, static, picture, force=force)
+        if as_json:
+            print_json({"status": "ok", "files": [str(path) for path in paths]})
+        else:
+            answer("\n".join(f"{path}: a session of the live bench" for path in paths))
     else:
-        _serve(bench, port, host, browser=not no_browser)
+        from elevon.live.server import serve
+
+        ready = _ready_json if as_json else _ready
+        with interrupt.telling(lambda: _recorded_files(bench)):
+            serve(
+                bench, port=port, host=host, browser=not no_browser, token=not no_token, ready=ready
+            )
 
 
-def _page(bench: LiveBench | LogReplay, folder: Path, *, force: bool) -> None:
-    from elevon.live.picture import write_static
-
-    paths = write_static(bench, folder, force=force)
-    sys.stdout.write(f"{len(paths)} files in {folder}\n")
-
-
-def _serve(bench: LiveBench | LogReplay, port: int, host: str, *, browser: bool) -> None:
-    from elevon.live.server import serve
-
-    with interrupt.telling(lambda: _recorded_files(bench)):
-        serve(bench, port=port, host=host, browser=browser, ready=_ready)
-
-
-def _picture(bench: LiveBench | LogReplay, path: Path, *, force: bool) -> None:
-    from elevon.files import write_text
+def _written(
+    bench: LiveBench | LogReplay, folder: Path | None, picture: Path | None, *, force: bool
+) -> list[Path]:
     from elevon.live.bench import LiveBench
-    from elevon.live.picture import animated_picture
+    from elevon.live.picture import animated_picture, write_static
 
+    if folder is not None:
+        write_static(bench, folder, force=force)
+        return [folder / "index.html"]
     if not isinstance(bench, LiveBench):
         raise InputError("--picture: draws a session of an actuator, not of a log")
+    path = cast(Path, picture)
     write_text(path, animated_picture(bench), force=force)
-    sys.stdout.write(f"{path}: a session of the live bench\n")
+    return [path]
 
 
 def _recorded_files(bench: LiveBench | LogReplay) -> str:
@@ -218,8 +222,13 @@ def _recorded_files(bench: LiveBench | LogReplay) -> str:
     return f"the bench is closed; recorded: {names or 'nothing'}"
 
 
-def _ready(address: str) -> None:
+def _ready(address: str, _token: str) -> None:
     sys.stdout.write(f"live at {address}\n")
+    sys.stdout.flush()
+
+
+def _ready_json(address: str, token: str) -> None:
+    sys.stdout.write(json.dumps({"status": "ok", "url": address, "token": token}) + "\n")
     sys.stdout.flush()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
+import logging
 import math
 import secrets
 import struct
@@ -21,7 +22,8 @@ import numpy as np
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from elevon.documents import check_depth
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from elevon.live.loop import LiveLoop
 
 
+_LOG = logging.getLogger(__name__)
 MOST_BYTES = 64 * 1024
 """Of a message."""
 _LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -56,7 +59,7 @@ class Guard:
     host : str
         Address it listens on.
     token : str
-        Asked for where that is not loopback; empty: none.
+        Asked for on every address; empty: none.
     """
 
     host: str = "127.0.0.1"
@@ -67,21 +70,27 @@ class Guard:
         """Whether only this machine can reach the server."""
         return self.host in _LOOPBACK
 
-    def refuses(self, headers: Mapping[str, str], token: str) -> str | None:
-        """Return why a request is refused; None where it is not.
+    def refuses(self, headers: Mapping[str, str], token: str) -> tuple[int, str] | None:
+        """Return status and reason of a refusal; None where a request is not refused.
 
         A page of another site may send requests to this machine: the browser names its origin, and
         the name it used for this server.
         """
-        host = headers.get("host", "")
-        name = urlsplit(f"//{host}").hostname or ""
+        host, origin = headers.get("host", ""), headers.get("origin")
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            place = host if origin is None else urlsplit(origin).netloc
+        except ValueError:
+            return 400, f"host {host!r:.60} or origin {origin!r:.60} is malformed"
         if self.local and name not in _LOOPBACK:
-            return f"host {host!r:.60} is not this machine"
-        origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
-            return f"origin {origin!r:.60} is not this page"
+            return 403, f"host {host!r:.60} is not this machine"
+        if place != host:
+            return 403, f"origin {origin!r:.60} is not this page"
         if self.token and not hmac.compare_digest(token.encode(), self.token.encode()):
-            return "the token is missing or wrong"
+            return (
+                403,
+                "the token is missing or wrong: it stands in the link that elevon live prints",
+            )
         return None
 
 
@@ -340,6 +349,32 @@ class ActBell:
         return True
 
 
+#: What is raised on a connection whose peer has gone.
+_VANISHED = (WebSocketDisconnect, RuntimeError, OSError)
+
+
+class Quiet:
+    """An application whose errors are a line each on the log, never a traceback.
+
+    Parameters
+    ----------
+    routes : sequence
+        What it answers.
+    """
+
+    def __init__(self, routes: Sequence[BaseRoute]) -> None:
+        self._app = Starlette(routes=routes)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request or serve a socket; an error in it has had the status 500."""
+        try:
+            await self._app(scope, receive, send)
+        except Exception as error:  # noqa: BLE001 - of whatever kind: it ends here
+            if not isinstance(error, _VANISHED):
+                place = f"{scope['type']} {scope.get('path', '')!r:.80}"
+                _LOG.error("live: %s: %s: %s", place, type(error).__name__, error)
+
+
 class LiveApp:
     """Routes of one bench.
 
@@ -355,8 +390,8 @@ class LiveApp:
         self.bench, self.guard, self.control = bench, guard, Control()
         self._acts = ActBell()
         self._frames = SharedFrames(bench.loop.ring, lambda: _text(self._now()))
-        self.asgi = Starlette(
-            routes=[
+        self.asgi = Quiet(
+            [
                 Route("/", self._page),
                 Route("/page/{name}", self._page),
                 Route("/model", self._model),
@@ -368,13 +403,13 @@ class LiveApp:
         )
 
     def _refused(self, request: Request) -> JSONResponse | None:
-        reason = self.guard.refuses(request.headers, _token(request))
-        return None if reason is None else _answer({"error": reason}, 403)
+        refusal = self.guard.refuses(request.headers, _token(request))
+        return None if refusal is None else _answer({"error": refusal[1]}, refusal[0])
 
     async def _page(self, request: Request) -> Response:
-        reason = Guard(self.guard.host).refuses(request.headers, "")
-        if reason is not None:
-            return _answer({"error": reason}, 403)
+        refusal = Guard(self.guard.host).refuses(request.headers, "")
+        if refusal is not None:
+            return _answer({"error": refusal[1]}, refusal[0])
         file = asset(request.path_params.get("name", "index.html"))
         if file is None:
             return _answer({"error": "no such page"}, 404)
@@ -425,7 +460,11 @@ class LiveApp:
         if self.guard.refuses(socket.headers, _token(socket)) is not None:
             await socket.close(code=4403)
             return
-        await socket.accept()
+        with suppress(*_VANISHED):
+            await socket.accept()
+            await self._accepted(socket)
+
+    async def _accepted(self, socket: WebSocket) -> None:
         name = self.control.join()
         writer = SnapshotWriter(self._frames)
         tasks = {
@@ -435,11 +474,11 @@ class LiveApp:
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
+            self.control.leave(name)
             for task in tasks:
                 task.cancel()
-            self.control.leave(name)
-            with suppress(RuntimeError):
-                await socket.close()
+            await asyncio.gather(*tasks, return_exceptions=True)
+        await socket.close()
 
     async def _send(self, socket: WebSocket, name: str, writer: SnapshotWriter) -> None:
         """Send snapshots as fast as the viewer takes them, thirty a second at most.
@@ -448,7 +487,7 @@ class LiveApp:
         All viewers are served at the same instants, so that what they have in common is made once.
         """
         loop, wall = self.bench.loop, asyncio.get_running_loop().time
-        with suppress(WebSocketDisconnect, RuntimeError, TimeoutError, OSError):
+        with suppress(*_VANISHED, TimeoutError):
             await _within(socket.send_text(_text({"viewer": name})))
             noted, tick = -1, float(int(wall() * RATE))
             while True:
@@ -466,7 +505,7 @@ class LiveApp:
 
     async def _receive(self, socket: WebSocket, name: str, writer: SnapshotWriter) -> None:
         """Take messages of a viewer: its choice of signals, and acts as `/act` has them."""
-        with suppress(WebSocketDisconnect, RuntimeError, KeyError):
+        with suppress(*_VANISHED, KeyError):
             while True:
                 received = await socket.receive()
                 if received["type"] == "websocket.disconnect":
@@ -493,11 +532,12 @@ def asset(name: str) -> tuple[bytes, str] | None:
     ending = name[name.rfind(".") :]
     if ending not in _TYPES or "/" in name or name.startswith("."):
         return None
-    if name in vendored:
-        file = files("elevon.report") / "vendor" / vendored[name]
-    else:
-        file = files("elevon.live") / "page" / name
-    return (file.read_bytes(), _TYPES[ending]) if file.is_file() else None
+    folder = (
+        files("elevon.report") / "vendor" if name in vendored else files("elevon.live") / "page"
+    )
+    wanted = vendored.get(name, name)
+    found = [file for file in folder.iterdir() if file.name == wanted]
+    return (found[0].read_bytes(), _TYPES[ending]) if found else None
 
 
 async def _body(request: Request) -> bytes:
@@ -522,7 +562,7 @@ def _choice(message: Mapping[str, Any]) -> tuple[list[str], int]:
 
 
 def _token(request: Request | WebSocket) -> str:
-    given = request.headers.get("x-token") or request.query_params.get("token", "")
+    given = request.headers.get("x-elevon-token") or request.query_params.get("token", "")
     return str(given)
 
 

@@ -133,7 +133,7 @@ class Script:
             if isinstance(time, bool) or not isinstance(time, (int, float)) or time < last:
                 raise InputError(f"repeat: step {number}: time = {time!r:.20}: must rise from 0 s")
             for key in acts:
-                if key not in known or key == "repeat":
+                if key not in known:
                     raise unknown("key", key, known, f"repeat: step {number}")
             script.mode = script.mode or str(mode)
             script.steps.append((float(time), acts))
@@ -159,6 +159,8 @@ KEYS = (
     "restart", "repeat", "factor", "pause", "set", "fault", "panel", "block", "command", "record",
     "save",
 )  # fmt: skip
+#: What no step of `repeat` may be: a script writes no files and begins no other.
+NOT_REPEATED = frozenset({"repeat", "record", "save", "restart"})
 _LOOK = 10.0  # s of a log that are diagnosed; two periods of a slower sine
 _LONGEST = 30.0
 _SHORTEST = 8.0
@@ -294,7 +296,7 @@ class LiveBench:
             self._begun()
 
     def _do_repeat(self, given: Any, _: dict[str, Any]) -> None:
-        script = Script.read(given, KEYS)
+        script = Script.read(given, [key for key in KEYS if key not in NOT_REPEATED])
         self.unit.renew(script.mode or self.unit.mode)
         self._begun()
         self.script = script

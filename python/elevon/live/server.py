@@ -24,7 +24,8 @@ def serve(
     port: int = 0,
     host: str = "127.0.0.1",
     browser: bool = True,
-    ready: Callable[[str], None] = print,
+    token: bool = True,
+    ready: Callable[[str, str], None],
 ) -> None:
     """Show a bench until Ctrl-C.
 
@@ -35,11 +36,14 @@ def serve(
     port : int
         0: a free one.
     host : str
-        Address to listen on; one that is not loopback needs the token of the address.
+        Address to listen on.
     browser : bool
         Whether the page is opened.
+    token : bool
+        Whether the server asks for the token of its address: without, each account of this machine
+        (and, beyond loopback, of the network) may act and record.
     ready : callable
-        Told the address once it answers.
+        Told the address, and its token, once it answers.
 
     Raises
     ------
@@ -51,7 +55,7 @@ def serve(
     from elevon.live.app import LiveApp
 
     bound = _bound(host, port)
-    guard = Guard(host) if Guard(host).local else Guard(host, secrets.token_urlsafe(16))
+    guard = Guard(host, secrets.token_urlsafe(16) if token else "")
     app = LiveApp(bench, guard)
     server = uvicorn.Server(
         uvicorn.Config(
@@ -63,7 +67,7 @@ def serve(
     address = _address(host, bound.getsockname()[1], guard.token)
     bench.start()
     try:
-        ready(address)
+        ready(address, guard.token)
         if browser:
             Timer(0.3, webbrowser.open, [address]).start()
         server.run(sockets=[bound])
