@@ -13,7 +13,9 @@ with zipfile.ZipFile("pi.fmu", "w") as fmu:
     fmu.write(HERE / "modelDescription.xml", "modelDescription.xml")
     fmu.write("pi.so", "binaries/linux64/pi.so")
 
-pi = elevon.Fmu("pi.fmu", {"speed": "motor_speed", "reference": 200.0, "torque": "command"})
+pi = elevon.Fmu(
+    "pi.fmu", {"speed": "motor_speed", "reference": 200.0, "torque": "command"}, trust=True
+)
 session = elevon.Session("torino-rotary", fidelity="low", mode="torque", controller=pi)
 session.advance("300 ms")
 print(f"{session['motor_speed'] * 30 / 3.14159265:.1f} rpm of 200")

@@ -106,7 +106,7 @@ def test_it_finds_no_problem(exported, name, fidelity, version):
 def test_an_exported_actuator_is_coupled_to_a_session(tmp_path, version):
     """Its position commands a second actuator, as that of a session beside it does."""
     path = export_fmu("torino-rotary", tmp_path / "a.fmu", fidelity="low", version=version).path
-    first = elevon.Fmu(path, {"command": 0.05, "output_position": "command"})
+    first = elevon.Fmu(path, {"command": 0.05, "output_position": "command"}, trust=True)
     second = elevon.Session("torino-rotary", fidelity="low", controller=first)
     alone = elevon.Session("torino-rotary", fidelity="low", signals=["output_position"])
     alone.set(command=0.05)

@@ -18,6 +18,7 @@ from elevon.errors import (
     InputError,
     UnknownNameError,
 )
+from elevon.session import fmu
 
 fmpy = pytest.importorskip("fmpy")
 HERE = Path(__file__).resolve().parents[2] / "examples" / "foreign-fmu"
@@ -47,7 +48,7 @@ def pi(tmp_path_factory):
 
 
 def session(pi, mapping=JOINED, actuator=UNIT, mode="torque", **kind):
-    controller = elevon.Fmu(pi, mapping, **kind)
+    controller = elevon.Fmu(pi, mapping, trust=True, **kind)
     return elevon.Session(actuator, fidelity="low", mode=mode, controller=controller), controller
 
 
@@ -102,17 +103,19 @@ def test_many_runs_have_an_instance_each(pi):
         elevon.Run(UNIT, {"duration": 1, "command": {"mode": "torque"}, "load": load})
         for load in ({}, pull)
     ]
-    both = elevon.Session(runs, fidelity="low", controller=elevon.Fmu(pi, JOINED))
+    both = elevon.Session(runs, fidelity="low", controller=elevon.Fmu(pi, JOINED, trust=True))
     both.advance("100 ms")
     for run, speed in zip(runs, both["motor_speed"], strict=True):
-        alone = elevon.Session([run], fidelity="low", controller=elevon.Fmu(pi, JOINED))
+        alone = elevon.Session([run], fidelity="low", controller=elevon.Fmu(pi, JOINED, trust=True))
         alone.advance("100 ms")
         assert alone["motor_speed"][0] == speed
     assert both["motor_speed"][0] != both["motor_speed"][1]
 
 
 def test_a_foreign_load_acts_with_what_it_had_put_out_at_the_tick(pi):
-    load = elevon.Fmu(pi, {"speed": "motor_speed", "torque": "output"}, parameters={"kp": -0.5})
+    load = elevon.Fmu(
+        pi, {"speed": "motor_speed", "torque": "output"}, parameters={"kp": -0.5}, trust=True
+    )
     loaded = elevon.Session(UNIT, fidelity="low", mode="speed", loads=[load])
     loaded.set(command="100 rpm")
     python = elevon.Session(UNIT, fidelity="low", mode="speed")
@@ -158,7 +161,7 @@ def test_what_else_does_not_fit_is_refused(pi):
         ({"kp": math.nan}, "must be finite"),
     ):
         with pytest.raises(InputError, match=words):
-            elevon.Fmu(pi, JOINED, parameters=parameters)
+            elevon.Fmu(pi, JOINED, trust=True, parameters=parameters)
     with pytest.raises(InputError, match="no whole number of solver steps"):
         session(pi, period=1.00001e-3)
     with pytest.raises(InputError, match="above 0"):
@@ -174,8 +177,13 @@ def test_what_else_does_not_fit_is_refused(pi):
     with pytest.raises(InputError, match="another kind"):
         taken.restore(alone.save())
     with pytest.raises(InputError, match="two outputs of FMUs"):
-        elevon.Session(UNIT, fidelity="low", mode="torque", controller=elevon.Fmu(pi, JOINED),
-                       loads=[elevon.Fmu(pi, {"torque": "command"})])  # fmt: skip
+        elevon.Session(
+            UNIT,
+            fidelity="low",
+            mode="torque",
+            controller=elevon.Fmu(pi, JOINED, trust=True),
+            loads=[elevon.Fmu(pi, {"torque": "command"}, trust=True)],
+        )
     controller.set(speed=1.0)
     for changed, words in (
         ({"speed": "motor_speed"}, "before the session"),
@@ -207,6 +215,14 @@ def test_what_it_puts_out_must_be_a_number(pi, tmp_path):
     with pytest.raises(ForeignModelError, match="torque = nan"):
         live.advance("10 ms")
     assert live.time == pytest.approx(0.002)
+
+
+def test_without_trust_nothing_is_loaded(pi, monkeypatch):
+    """An FMU is a program: neither its library nor its folder is touched."""
+    monkeypatch.setattr(fmu, "FmuInstance", None)
+    for given in ({}, {"trust": False}, {"trust": "yes"}):
+        with pytest.raises(InputError, match=r"is a program.*trust=True"):
+            elevon.Fmu(pi, JOINED, **given)
 
 
 def test_files_that_are_none_are_refused(pi, tmp_path):

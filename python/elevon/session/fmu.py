@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -202,7 +202,8 @@ class Fmu:
     with what it put out at that tick and steps beside the actuator. Values are held between ticks.
     In a session of many runs each has its own instance.
 
-    An FMU is a program: loading it runs it with the rights of this process.
+    An FMU is a program: loading it runs it with the rights of this process. It cannot be copied or
+    pickled: what it holds is a state of that program.
 
     Parameters
     ----------
@@ -218,18 +219,22 @@ class Fmu:
     period : float or str, optional
         Between its ticks: a whole number of solver steps. Default: the step that the FMU states,
         else 1 ms.
+    trust : bool
+        That it may be loaded.
 
     Raises
     ------
     InputError
-        FMPy is not installed (extra ``fmu``); no such file, none for co-simulation or for this
-        platform; a variable that is not there or is no input, output or parameter.
+        Without `trust`; FMPy is not installed (extra ``fmu``); no such file, none for
+        co-simulation or for this platform; a variable that is not there or is no input, output or
+        parameter.
     FormatError
         A file that is no FMU, or one that FMPy finds invalid.
 
     Examples
     --------
-    >>> pi = elevon.Fmu("pi.fmu", {"speed": "motor_speed", "torque": "command"})  # doctest: +SKIP
+    >>> joined = {"speed": "motor_speed", "torque": "command"}
+    >>> pi = elevon.Fmu("pi.fmu", joined, trust=True)  # doctest: +SKIP
     >>> session = Session("torino-rotary", mode="torque", controller=pi)  # doctest: +SKIP
     """
 
@@ -240,9 +245,15 @@ class Fmu:
         *,
         parameters: Mapping[str, float | str | bool] | None = None,
         period: float | str | None = None,
+        trust: bool = False,
     ) -> None:
         self.path = Path(path).expanduser()
         self._description = _described(self.path)
+        if trust is not True:
+            raise InputError(
+                f"{self.path}: an FMU is a program, which would run with all rights of this "
+                "process; where you trust who made it, give trust=True"
+            )
         self.variables = {item.name: item for item in self._description.modelVariables}
         if not isinstance(mapping, Mapping):
             raise ArgumentTypeError(f"mapping: {mapping!r:.60} is no mapping of variables")
@@ -260,6 +271,15 @@ class Fmu:
         self._instances: list[FmuInstance] = []
         self._inputs: list[_Link] = []
         self._outputs: list[_Link] = []
+
+    def __copy__(self) -> NoReturn:
+        raise ArgumentTypeError(f"{self}: is a foreign program; make another Fmu of its file")
+
+    def __deepcopy__(self, _memo: dict[int, object]) -> NoReturn:
+        self.__copy__()
+
+    def __reduce__(self) -> NoReturn:
+        self.__copy__()
 
     def __str__(self) -> str:
         return self.path.name

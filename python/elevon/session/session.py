@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from typing import Any
+from typing import Any, NoReturn, Self
 
 import numpy as np
 
@@ -152,6 +152,27 @@ class Session:
 
     def __len__(self) -> int:
         return len(self.actuators)
+
+    def __copy__(self) -> Self:
+        """Return a session of its own at the same instant: each then goes on by itself."""
+        if self._coupling is not None:
+            raise InputError("copy: the state of a coupled FMU is no part of the session's")
+        twin = object.__new__(type(self))
+        vars(twin).update(vars(self))
+        twin._core = self._core.copy()
+        twin._faults = tuple(dict(item) for item in self._faults)
+        twin._signals = SignalIndex(self.wiring, self.fidelity)
+        twin._driven, twin._diverged = set(self._driven), set(self._diverged)
+        return twin
+
+    def __deepcopy__(self, _memo: dict[int, object]) -> Self:
+        return self.__copy__()
+
+    def __reduce__(self) -> NoReturn:
+        raise ArgumentTypeError(
+            "a session cannot be pickled: it lives in this process's memory; keep the scenario and "
+            "the acts, and run them again"
+        )
 
     @property
     def time(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 
@@ -221,6 +221,17 @@ class SessionState:
     faults: tuple[Mapping[str, int], ...]
     kind: tuple[Any, ...]
     """What two sessions have alike that may exchange states: wiring, fidelity, step, modes."""
+
+    def __copy__(self) -> Self:
+        return self  # nothing changes it: a session goes on from a copy of the core
+
+    def __deepcopy__(self, _memo: dict[int, object]) -> Self:
+        return self
+
+    def __reduce__(self) -> NoReturn:
+        raise ArgumentTypeError(
+            "a state of a session cannot be pickled: it lives in this process's memory"
+        )
 
 
 def runs_of(
