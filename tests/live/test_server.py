@@ -20,6 +20,10 @@ from tests.live.browser import browser, needs_browser, opened, press, until
 from tests.live.serving import SINE, bench
 
 STREAM = "stream"
+UPGRADE = (
+    b"\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13"
+    b"\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="
+)
 PICTURE = "document.querySelector('#picture').innerHTML"
 
 
@@ -68,7 +72,7 @@ def test_a_server_that_asks_for_no_token(tmp_path):
     [
         (b"Host: [::1", 400),
         (b"Host: localhost\r\nOrigin: http://[", 400),
-        (b"Host: ]", 403),
+        (b"Host: ]", 400),
         (b"Host: \xff\xfe", 403),
         (b"Host: localhost\r\nX-Elevon-Token: \xff", 403),
     ],
@@ -77,6 +81,8 @@ def test_a_server_that_asks_for_no_token(tmp_path):
 def test_malformed_heads_are_refused_without_an_error(live, head, status, path):
     if path == "" and b"Token" in head:
         status = 200  # the page itself holds nothing
+    if path == "stream":
+        head += UPGRADE
     assert _raw(live, f"GET /{path} HTTP/1.1".encode(), head) == status
 
 
@@ -97,7 +103,7 @@ def _raw(live, line, head):
 def test_viewers_that_vanish_leave_no_line(tmp_path):
     """Connections that are reset while a picture is on its way: stderr stays empty."""
     with bench("--fidelity", "low", folder=tmp_path) as server:
-        sockets = [_socket(server) for _ in range(12)]
+        sockets = [_socket(server).__enter__() for _ in range(12)]  # none is closed in order
         for viewer in sockets:
             _viewer(viewer)
             linger = struct.pack("ii", 1, 0)  # closing resets the connection

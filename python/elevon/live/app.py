@@ -457,10 +457,11 @@ class LiveApp:
         return {**self.bench.state(), "control": control}
 
     async def _stream(self, socket: WebSocket) -> None:
-        if self.guard.refuses(socket.headers, _token(socket)) is not None:
-            await socket.close(code=4403)
-            return
+        refusal = self.guard.refuses(socket.headers, _token(socket))
         with suppress(*_VANISHED):
+            if refusal is not None:
+                await socket.send_denial_response(_answer({"error": refusal[1]}, refusal[0]))
+                return
             await socket.accept()
             await self._accepted(socket)
 
