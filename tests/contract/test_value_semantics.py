@@ -69,10 +69,10 @@ def form(item, seen=()):
     if isinstance(item, (list, tuple, set, frozenset)):
         return tuple(form(value, seen) for value in item)
     slots = [name for kind in type(item).__mro__ for name in getattr(kind, "__slots__", ())]
-    held = {name: getattr(item, name) for name in slots if hasattr(item, name)}
-    held |= getattr(item, "__dict__", {})
+    fields = {name: getattr(item, name) for name in slots if hasattr(item, name)}
+    fields |= getattr(item, "__dict__", {})
     args = getattr(item, "args", ()) if isinstance(item, BaseException) else ()
-    return (type(item).__name__, form(args, seen), form(held, seen))
+    return (type(item).__name__, form(args, seen), form(fields, seen))
 
 
 @pytest.mark.parametrize("way", WAYS)
