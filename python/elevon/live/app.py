@@ -537,8 +537,8 @@ def asset(name: str) -> tuple[bytes, str] | None:
         files("elevon.report") / "vendor" if name in vendored else files("elevon.live") / "page"
     )
     wanted = vendored.get(name, name)
-    found = [file for file in folder.iterdir() if file.name == wanted]
-    return (found[0].read_bytes(), _TYPES[ending]) if found else None
+    matching = [file for file in folder.iterdir() if file.name == wanted]
+    return (matching[0].read_bytes(), _TYPES[ending]) if matching else None
 
 
 async def _body(request: Request) -> bytes:
