@@ -47,8 +47,7 @@ class PublishedCase:
     table : str or None
         Above that table.
     page : str
-        Result to the report; ``described``: by its description in ``pages``; empty:
-        nothing is written.
+        Result to the report; empty: nothing is written.
     options : mapping of str to mapping
         Options beyond those that every case has: as in ``options.toml``, with ``default``, or with
         ``type`` (``path``, ``texts``, ``count``) and, where it must be given, ``required``.
@@ -106,11 +105,7 @@ class PublishedCase:
 
     def report(self, result: WithChecks, options: Options) -> Report:
         """Return the page of a result."""
-        if self.page != "described":
-            return cast("Report", self.call(self.page, result, **options))
-        from elevon_cases.case_page import case_page
-
-        return case_page(self.name, result, date=options["date"], options=options)
+        return cast("Report", self.call(self.page, result, **options))
 
     def call(self, function: str, *arguments: Any, **options: Any) -> Any:
         """Call a function by its name, with the options that it has arguments for."""

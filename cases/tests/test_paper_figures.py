@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from elevon.recording import Recording
-from elevon_cases.case_page import case_page
 from elevon_cases.nasa.faults import (
     LEVELS,
     RESISTANCES,
     SPEEDS,
     FaultFigure,
     SeedingRow,
+    faults_page,
     figure_checks,
     reproduce_faults,
     seeding_checks,
@@ -24,6 +24,7 @@ from elevon_cases.pisa.commutation import (
     SectorRow,
     ShortedPulse,
     checks_of,
+    commutation_page,
     reproduce_commutation,
     sectors,
     shorted_pulses,
@@ -126,11 +127,11 @@ def test_stretches_at_rest_are_none():
 def test_the_ballscrews_figures_pass():
     result = reproduce_faults()
     assert failed(result.checks) == []
-    assert "baseline" in case_page("nasa-faults", result, date="2026-01-01").html()
+    assert "baseline" in faults_page(result, "2026-01-01").html()
 
 
 @pytest.mark.long
 def test_the_gears_currents_pass():
     result = reproduce_commutation()
     assert failed(result.checks) == []
-    assert "As Fig. 5.4" in case_page("pisa-commutation", result, date="2026-01-01").html()
+    assert "As Fig. 5.4" in commutation_page(result, "2026-01-01").html()

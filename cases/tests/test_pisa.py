@@ -6,10 +6,9 @@ import math
 
 import pytest
 
-from elevon_cases.case_page import case_page
-from elevon_cases.pisa.friction import reproduce_friction
-from elevon_cases.pisa.functional import reproduce_functional
-from elevon_cases.pisa.hydraulic import HydraulicActuator, reproduce_hydraulic
+from elevon_cases.pisa.friction import friction_page, reproduce_friction
+from elevon_cases.pisa.functional import functional_page, reproduce_functional
+from elevon_cases.pisa.hydraulic import HydraulicActuator, hydraulic_page, reproduce_hydraulic
 
 
 def test_functional_runs_meet_their_requirements() -> None:
@@ -26,7 +25,7 @@ def test_functional_runs_meet_their_requirements() -> None:
     assert limit["requirement_s"] is None
     # 14 V cannot reach the high speed in retraction: slower than every other condition.
     assert limit["retraction_s"] > 1.2 * max(row["retraction_s"] for row in others)
-    assert "limit" in case_page("pisa-functional", result, date="2000-01-01").html().lower()
+    assert "limit" in functional_page(result, "2000-01-01").html().lower()
 
 
 @pytest.mark.long
@@ -45,7 +44,7 @@ def test_friction_tests_recover_what_was_put_in() -> None:
         assert {row.direction for row in mine} == {"extension", "retraction"}
         assert min(row.speed_mm_s for row in mine) == 1.0
         assert max(row.speed_mm_s for row in mine) == 10.0
-    page = case_page("pisa-friction", result, date="2000-01-01").html()
+    page = friction_page(result, "2000-01-01").html()
     assert "extrapolated" in page
     assert "<details>" in page
     # The spectrum of P Figs. 4.5, 4.6: lines at whole orders, the first the highest.
@@ -83,4 +82,4 @@ def test_hydraulic_speed_follows_load_and_temperature() -> None:
     # In extension nothing brakes the overshoot at 1 g before mid-stroke: over the limit, and said.
     failed = [check.name for check in result.checks if not check.passed]
     assert failed == ["extension, spread of the controlled speed"]
-    assert case_page("pisa-hydraulic", result, date="2000-01-01").html()
+    assert hydraulic_page(result, "2000-01-01").html()

@@ -11,11 +11,11 @@ import pytest
 
 import elevon
 from elevon.faults.catalogue import catalogue
-from elevon_cases.case_page import case_page
 from elevon_cases.pisa.failures import (
     LISTED,
     PHASES,
     failure_checks,
+    failures_page,
     judge,
     reproduce_failures,
     summary,
@@ -39,7 +39,7 @@ def test_a_slipping_brake_never_gives_a_false_indication() -> None:
     assert at_rest["indicated"] == "fault"
     assert at_rest["detected_by"] == "fault: uncommanded motion"
     assert 0.0 < at_rest["time_s"] < 0.3
-    assert "at rest, retracted" in case_page("pisa-failures", result, date="2000-01-01").html()
+    assert "at rest, retracted" in failures_page(result, "2000-01-01").html()
     assert len(summary(result)[1]) == len(PHASES)
     assert matrix(result).splitlines()[2] in PAGE.read_text(encoding="utf-8")
 

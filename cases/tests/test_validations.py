@@ -5,8 +5,7 @@ import json
 import pytest
 
 from elevon.cli import main
-from elevon_cases.case_page import case_page
-from elevon_cases.nasa.current import PUBLISHED, CurrentResult, CurrentRow
+from elevon_cases.nasa.current import PUBLISHED, CurrentResult, CurrentRow, current_page
 
 
 def rows(percent):
@@ -35,7 +34,7 @@ def test_fewer_runs_than_published_fail():
 
 
 def test_the_page_says_what_measured_means_and_shows_the_published_figures():
-    page = case_page("nasa-current", CurrentResult(rows(7.0), [], 0, ""), date="2026-01-01").html()
+    page = current_page(CurrentResult(rows(7.0), [], 0, ""), "2026-01-01").html()
     assert "not published" in page
     for figures in PUBLISHED.values():
         for value in figures:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,16 @@ import numpy.typing as npt
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.progress import Progress
+from elevon.report import Report
 from elevon.report.checks import Check, verdict
+from elevon.report.figures import new_figure
 from elevon.units import to_si
 from elevon_cases.nasa.profiles import LoadKind, MotionProfile, profile_scenario
+from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, RED, VIOLET, Column, table_of, with_end
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 DRIFT = 4.0
 """The laboratory warms by so much during a block [K] (ASSUMED): random order keeps it out of the
@@ -142,26 +149,142 @@ def _rounded(value: float, digits: int) -> float | None:
     return None if np.isnan(value) else round(value, digits) + 0.0
 
 
-def page_values(result: BaselineResult) -> dict[str, object]:
-    """Return the current of each run at 50 mm and 6 cm/s over its load, by profile."""
-    middle = [
-        row
-        for row in result.rows
-        if abs(row.profile.amplitude - 0.05) < 1e-9 and abs(row.profile.rate - 0.06) < 1e-9
-    ]
-    names = dict.fromkeys(row.profile.name for row in result.rows)
-    currents = []
-    for place, (name, colour) in enumerate(zip(names, _COLOURS, strict=False)):
-        runs = [(row.load, run[0]) for row in middle if row.profile.name == name
-                for run in row.runs]  # fmt: skip
-        if runs:
-            load, current = np.array(runs).T
-            load = load / 1e3 + 0.06 * (place - 2)
-            currents.append({"name": name, "colour": colour, "load": load, "current": current})
-    return {"currents": currents}
+def baseline_page(result: BaselineResult, date: str | None = None) -> Report:
+    """Return the report: effects, current over load, histories, corners, every cell."""
+    report = Report(
+        "Nominal runs of the ballscrew actuator",
+        "Every profile at both amplitudes and both rates under every load, "
+        f"{result.replicates} times: each time another reassembly, in an order of its own, while "
+        f"the laboratory warms by {DRIFT:g} K. Statistics after the first 2 s; tracking is command "
+        "less position on the load's side of the joint.",
+        date=date,
+    )
+    states = [row.status for row in result.rows]
+    report.fact("Cells", str(len(states)), f"load: {result.load_kind}")
+    runs = sum(len(row.runs) for row in result.rows)
+    report.fact("Runs", str(runs), "replicates in blocks")
+    limited, refused = (str(states.count(name)) for name in ("limited", "refused"))
+    report.fact("Limited", limited, "ask for more than there is, and run")
+    report.fact("Refused", refused, "ramps that cannot be followed")
+    if result.effects:
+        _add_effects(report, result.effects)
+    report.section("Current against load").figure(
+        _currents_figure(result.rows), "RMS phase current at 50 mm and 6 cm/s, each run."
+    )
+    if result.histories:
+        section = report.section(
+            "Time histories",
+            "Figures 5, 6 and 7 of the paper as the model gives them. Their curves are drawn, not "
+            "printed, so nothing is held against them.",
+        )
+        for item in result.histories:
+            section.figure(_history_figure(item), f"Figure {item.figure}: {item.title}.")
+    if result.corners:
+        report.section(
+            "Corners",
+            "The paper draws sharp corners, which ask for infinite acceleration: the current limit "
+            "of 20 A is then every peak. With the corners rounded the peak is that of the motion.",
+        ).table(table_of(result.corners, _CORNERS, "Acceleration 0: sharp, as drawn."))
+    caption = "Means over the replicates and the scatter between reassemblies."
+    cells = table_of((row.to_dict() for row in result.rows), _CELLS, caption)
+    report.section("All cells").table(cells)
+    command = (
+        f"nasa-baseline --load-kind {result.load_kind} --replicates {result.replicates} "
+        f"--seed {result.seed}"
+    )
+    made = {"Parameter hash": result.meta["parameter_hash"], "Seed": result.seed,
+            "Core": result.meta["version"]}  # fmt: skip
+    return with_end(report, result.checks, command, made)
 
 
-_COLOURS = ("grey", "blue", "orange", "green", "red")
+_CORNERS = (
+    ("Profile", "profile"),
+    ("Load [N]", "load_n", ".0f"),
+    ("Acceleration [m/s2]", "acceleration_m_s2", ".1f"),
+    ("Peak current [A]", "peak_current_a", ".2f"),
+    ("RMS current [A]", "rms_current_a", ".3f"),
+    ("Tracking max [mm]", "tracking_max_mm", ".3f"),
+)
+_CELLS = (
+    ("Profile", "profile"),
+    ("Amplitude [mm]", "amplitude_mm", ".0f"),
+    ("Rate [mm/s]", "rate_mm_s", ".0f"),
+    ("Load [N]", "load_n", ".0f"),
+    ("Direction", "direction"),
+    ("RMS current [A]", "rms_current_a", ".3f"),
+    ("Peak current [A]", "peak_current_a", ".2f"),
+    ("Tracking RMS [mm]", "tracking_rms_mm", ".4f"),
+    ("Winding rise in 30 s [K]", "winding_rise_k", ".3f"),
+    ("Scatter of the RMS [A]", "rms_current_scatter_a", ".4f"),
+    ("Status", "status"),
+)
+_COLOURS = (GREY, BLUE, ORANGE, GREEN, RED)
+
+
+def _add_effects(report: Report, effects: Mapping[str, Sequence[FactorEffect]]) -> None:
+    section = report.section(
+        "Effects",
+        "Change from the low to the high level in the two-level part of the matrix (sinusoidal "
+        "against triangular, 50 against 100 mm, 6 against 12 cm/s, 500 against 8500 N, tensile "
+        "against compressive): least squares with one offset a block and all pairs of factors, "
+        "95 % intervals, probabilities corrected over the terms (Holm).",
+    )
+    for name, rows in effects.items():
+        title, unit, decimals = MEASURES[name]
+        shown = f"+.{decimals}f"
+        columns: tuple[Column, ...] = (
+            ("Factor or pair", "term"),
+            (f"Effect [{unit}]", "effect", shown),
+            ("from", "low", shown),
+            ("to", "high", shown),
+            ("p", lambda row: "< 1e-4" if row.p < 1e-4 else f"{row.p:.2g}"),
+        )
+        section.table(table_of(rows, columns, title))
+
+
+def _currents_figure(rows: Sequence[BaselineRow]) -> Figure:
+    """Draw the current of each run at 50 mm and 6 cm/s over its load, by profile."""
+    names = dict.fromkeys(row.profile.name for row in rows)
+    with new_figure() as (figure, axes):
+        for place, (name, colour) in enumerate(zip(names, _COLOURS, strict=False)):
+            runs = [
+                (row.load, run[0])
+                for row in rows
+                if row.profile.name == name
+                and abs(row.profile.amplitude - 0.05) < 1e-9
+                and abs(row.profile.rate - 0.06) < 1e-9
+                for run in row.runs
+            ]
+            if runs:
+                load, current = np.array(runs).T
+                load = load / 1e3 + 0.06 * (place - 2)
+                axes.plot(load, current, "o", ms=3, color=colour, label=name)
+        axes.set(xlabel="Load, compressive positive [kN]", ylabel="RMS phase current [A]")
+        axes.legend()
+    return figure
+
+
+def _history_figure(item: HistoryFigure) -> Figure:
+    time, curves = item.time, item.curves
+    above = {"fontsize": 8, "loc": "lower left", "bbox_to_anchor": [0.0, 1.0], "ncols": 2,
+             "borderpad": 0.2}  # fmt: skip
+    with new_figure(2, 2, height=4.4, sharex=True) as (figure, axes):
+        (position, load), (current, warmth) = axes
+        position.plot(time, 1e3 * curves["command"], color=GREY, label="command")
+        reached = 1e3 * curves["output_position"]
+        position.plot(time, reached, color=BLUE, label="position", lw=1)
+        position.set(ylabel="Position [mm]")
+        load.plot(time, 1e-3 * curves["joint_force"], color=VIOLET, lw=1)
+        load.set(ylabel="Load cell [kN]")
+        current.plot(time, curves["current_ref"], color=ORANGE, lw=1)
+        current.set(ylabel="Current reference [A]", xlabel="Time [s]")
+        for place, colour in (("winding", ORANGE), ("surface", BLUE)):
+            warm = curves[f"{place}_temperature"] - 273.15
+            warmth.plot(time, warm, color=colour, label=place)
+        warmth.set(ylabel="Temperature [degC]", xlabel="Time [s]")
+        for panel in (position, warmth):
+            panel.legend(**above)
+    return figure
 
 
 RECORD = (

@@ -18,8 +18,11 @@ from elevon.arrays import Floats
 from elevon.logs.command.curve import CommandCurve, rebuilt_curve
 from elevon.plain import Plain
 from elevon.progress import Progress, part
+from elevon.report import Report, ReportTable
 from elevon.report.checks import Check, verdict
+from elevon.report.figures import new_figure
 from elevon.units import to_si
+from elevon_cases.page import GREY, ORANGE, table_of, with_end
 
 ACTUATOR = "nasa-ballscrew"
 POUND_FORCE = float(to_si(1.0, "lbf"))
@@ -305,3 +308,45 @@ def _table(time: Any, values: Any) -> dict[str, Any]:
         "times": np.asarray(time).tolist(),
         "values": np.asarray(values).tolist(),
     }
+
+
+def current_page(result: CurrentResult, date: str | None = None) -> Report:
+    """Return the report: errors of every run, the paper's figures."""
+    report = Report(
+        "Predicted and measured current of the ballscrew actuator",
+        "The paper prints its percentages and draws four runs; its signals were not published. "
+        "Measured here means our virtual stand with a mismatch that the model does not know "
+        "(friction law, magnets, screw, reassembly, load actuator, sensors). The percentages stand "
+        "beside the published ones and are not the same experiment.",
+        date=date,
+    )
+    compared = ReportTable(
+        ("Runs", "Source", "Average [%]", "Maximum [%]", "Minimum [%]"),
+        [list(row) for row in result.compared],
+        "RMS error over the measured current's RMS about its mean; the paper does not define its "
+        "percentage.",
+        formats=("", "", ".2f", ".2f", ".2f"),
+    )
+    columns = (
+        ("State", "state"),
+        ("Assembly", "assembly"),
+        ("Profile", "profile"),
+        ("Load", "load"),
+        ("Error [%]", "percent_rms"),
+        ("Between corners [%]", "percent_between_corners"),
+        ("Error [A]", "rms_a"),
+    )
+    report.section("Percent RMS error of the current").table(compared).table(
+        table_of(result.rows, columns, "Every run.", folded="Every run")
+    )
+    for trace in result.traces:
+        with new_figure(height=3.0) as (figure, axes):
+            axes.plot(trace.time, trace.measured, color=GREY, lw=3.0, label="measured")
+            axes.plot(trace.time, trace.predicted, color=ORANGE, lw=1.0, label="model")
+            axes.set(xlabel="Time [s]", ylabel="Current [A]")
+            axes.legend(loc="upper right", ncols=2)
+        report.section(f"As Fig. {trace.figure}: {trace.title}").figure(
+            figure, "Torque current of the virtual stand and of the model."
+        )
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"nasa-current --seed {result.seed}", made)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -19,7 +19,14 @@ from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREY, ORANGE, table_of, with_end
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 ACTUATOR = "nasa-ballscrew"
 FAULTS = {18: "eccentricity_dynamic@motor=0.1", 19: "short@motor.phase_a=0.2"}
@@ -273,3 +280,67 @@ def seeding_checks(rows: Sequence[SeedingRow]) -> list[Check]:
 def _spread(rows: Sequence[SeedingRow], level: float, name: str) -> float:
     values = np.array([getattr(row, name) for row in rows if row.level == level])
     return float(100.0 * np.ptp(values) / values.mean())
+
+
+def faults_page(result: FaultFiguresResult, date: str | None = None) -> Report:
+    """Return the report: the two figures, both ways to seed a short."""
+    report = Report(
+        "Dynamic eccentricity and winding shorts of the ballscrew actuator",
+        "The paper's Figs. 18 and 19 with their printed levels, each beside the healthy unit, and "
+        "true shorts beside resistors to the centre tap at its five levels over speed.",
+        date=date,
+    )
+    for item in result.figures:
+        report.section(f"As Fig. {item.figure}: {item.fault}").figure(
+            _panels_figure(item),
+            f"The tracking error moves by {item.tracking_percent:.2g} % of the amplitude, the RMS "
+            f"of the torque current by {item.torque_current_percent:.2g} %.",
+        )
+    columns = (
+        ("Level", "level", ".4g"),
+        ("Resistor [ohm]", "resistance_ohm", ".0f"),
+        ("Speed [rad/s]", "speed_rad_s", ".0f"),
+        ("Shorted turns [A]", "turns_a", ".3f"),
+        ("Resistor [A]", "resistor_a", ".3f"),
+    )
+    report.section("Seeding a winding short").figure(
+        _seeding_figure(result.rows), "Current that the fault adds to the leg of phase 1, RMS."
+    ).text(
+        "At a fixed applied voltage: a resistor draws V/R at any speed, shorted turns let through "
+        "what the EMF leaves of the voltage. Under the drive's control the voltage follows the "
+        "speed itself, so no closed-loop run shows this."
+    ).table(table_of(result.rows, columns))
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, "nasa-faults", made)
+
+
+def _panels_figure(item: FaultFigure) -> Figure:
+    """Draw the paper's panels: position, load, current of phase 1, a part with all its samples."""
+    zoom = (item.time > ZOOM[0]) & (item.time < ZOOM[1])
+    with new_figure(2, 2, height=5.4) as (figure, axes):
+        (position, load), (current, close) = axes
+        position.plot(item.time[::10], 1e3 * item.position[::10], color=BLUE)
+        position.set(ylabel="Position [mm]")
+        load.plot(item.time[::10], item.load[::10], color=BLUE)
+        load.set(ylabel="Load [N]")
+        for panel, shown in ((current, slice(None, None, 10)), (close, zoom)):
+            time, healthy, faulty = item.time[shown], item.healthy[shown], item.faulty[shown]
+            panel.plot(time, healthy, color=GREY, lw=1.5, label="baseline")
+            panel.plot(time, faulty, color=ORANGE, lw=0.8, label="fault")
+            panel.set(xlabel="Time [s]", ylabel="Phase 1 [A]")
+        close.legend(loc="upper right")
+    return figure
+
+
+def _seeding_figure(rows: Sequence[SeedingRow]) -> Figure:
+    with new_figure(1, 2, height=3.2) as (figure, both):
+        for axes, name, title in zip(
+            both, ("turns_a", "resistor_a"), ("shorted turns", "resistor"), strict=True
+        ):
+            for level in LEVELS:
+                current = [getattr(row, name) for row in rows if row.level == level]
+                axes.plot(SPEEDS, current, "o-", ms=3, label=f"{100 * level:.4g} %")
+            axes.set(xlabel="Motor [rad/s]", title=title, ylim=(0, None))
+        both[0].set(ylabel="Added current [A]")
+        both[0].legend()
+    return figure

@@ -19,8 +19,11 @@ from elevon.bench.flyable import FlightConditions, FlightLog, air_of, fly, share
 from elevon.loads import FlightData, HingeMoment, flight_load
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
 from elevon.scenario import Scenario
+from elevon_cases.page import BLUE, ORANGE, table_of, with_end
 
 ACTUATOR = "nasa-ballscrew"
 SECONDS = 40.0
@@ -193,3 +196,42 @@ def checks_of(excess: float, floor: Floats, missing: float) -> list[Check]:
         Check("healthy pairs: largest difference of the same", 100.0 * float(np.abs(floor).max()),
               50.0 * abs(excess), "%"),
     ]  # fmt: skip
+
+
+def flight_page(result: FlightResult, date: str | None = None) -> Report:
+    """Return the report: the flight's signals, each stretch between two switchings."""
+    report = Report(
+        "The flyable stand: nominal and faulty actuator in one flight",
+        "The paper plans a stand with a nominal, a faulty and a load actuator, the load switched "
+        "between the two in flight. It prints no flight: this one is synthetic, and so are load "
+        f"factor, vibration and the fault ({FAULT}).",
+        date=date,
+    )
+    shown = (
+        ("command", 1e3, "Command [mm]"),
+        ("load", 1.0, "Force [N]"),
+        ("torque_current", 1.0, "Current [A]"),
+        ("surface_temperature", 1.0, "Housing [K]"),
+    )
+    with new_figure(4, 1, height=7.0, sharex=True) as (figure, panels):
+        for axes, (role, scale, label) in zip(panels, shown, strict=True):
+            for item, colour in zip(result.logs, (BLUE, ORANGE), strict=True):
+                channel = item.log.role(role)
+                time, values = channel.time[::5], scale * channel.values[::5]
+                axes.plot(time, values, color=colour, lw=0.8, label=item.unit)
+            axes.set_ylabel(label)
+        panels[0].legend(loc="upper right", ncols=2)
+        panels[-1].set_xlabel("Time [s]")
+    report.section("The flight").figure(
+        figure, f"Both actuators; the load changes over every {SWITCH:g} s."
+    )
+    columns = (
+        ("Actuator", "unit"),
+        ("From [s]", "begin_s", ".0f"),
+        ("Force RMS [N]", "load_n", ".0f"),
+        ("Current RMS [A]", "current_a", ".3f"),
+        ("Tracking RMS [mm]", "tracking_mm", ".3f"),
+        ("Current a force [A/kN]", "current_per_load_a", ".4f"),
+    )
+    report.section("Stretches").table(table_of(result.rows, columns, "Of whoever bears the load."))
+    return with_end(report, result.checks, "nasa-flight")

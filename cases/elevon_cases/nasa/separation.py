@@ -19,8 +19,9 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.progress import Progress, part
+from elevon.report import Report, ReportTable
 from elevon.report.checks import Check
-from elevon.report.figures import COLOURS, new_figure
+from elevon.report.figures import new_figure
 from elevon.simulate import Run, completed, simulate_batch
 from elevon_cases.nasa.features import (
     FEATURES,
@@ -29,6 +30,7 @@ from elevon_cases.nasa.features import (
     RECORD,
     RMS,
     UNITS,
+    ImpactTrace,
     compared,
     features,
     gap_impacts,
@@ -48,6 +50,7 @@ from elevon_cases.nasa.separation_rows import (
     compare_profiles,
     null_p,
 )
+from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, RED, VIOLET, Column, table_of, with_end
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -308,31 +311,114 @@ def _checks(rows: Sequence[SeparationRow]) -> list[Check]:
     ]  # fmt: skip
 
 
-_ROUNDED = ", rounded"
 SHAPE_COLOURS = {
-    "trapezoidal": COLOURS["blue"],
-    "sinusoidal": COLOURS["orange"],
-    "triangular": COLOURS["green"],
-    "sweep": COLOURS["violet"],
+    "trapezoidal": BLUE,
+    "sinusoidal": ORANGE,
+    "triangular": GREEN,
+    "sweep": VIOLET,
 }
 
 
-def page_values(result: SeparationResult) -> dict[str, object]:
-    """Return the drawings, and what the tables say beside the rows."""
-    places = dict.fromkeys((trace.load, trace.profile) for trace in result.traces)
-    return {
-        "winners": list(result.winners().values()),
-        "power": POWER,
-        "acceleration": ACCELERATION,
-        "map": _power_map(result),
-        "effects": _effects_figure(result),
-        "best": _winners(result),
-        "traces": [
-            (load, shape, [t for t in result.traces if (t.load, t.profile) == (load, shape)])
-            for load, shape in places
-        ],
-        "spread": spread_rows(),
-    }
+def separation_page(result: SeparationResult, date: str | None = None) -> Report:
+    """Return the report: best profiles, effects, the gap's impact, the population, every row."""
+    report = Report(
+        "Which profile shows which fault",
+        f"{result.healthy} healthy units and {result.reassemblies} of each fault, every one in "
+        "every profile under every load. One feature a fault, named beforehand. A profile is "
+        "called the best only where its interval lies above all others and another such experiment "
+        f"would find that again with a probability of {100 * POWER:.0f} %. Rounded corners have "
+        f"{ACCELERATION:g} m/s2, all others are sharp as in the paper.",
+        date=date,
+    )
+    winners = list(result.winners().values())
+    named = sum(winner is not None for winner in winners)
+    report.fact("Best profile named", f"{named} of {len(winners)}", "pairs of fault and load")
+    report.fact("Null rate", f"{100 * result.null_rate:.2g} %", "healthy against healthy")
+    level = f"{100 * result.level:.3f} %"
+    report.fact("Level", level, "of each interval; 95 % for the table")
+    report.section("Best profiles").figure(
+        _power_map(result),
+        "Largest distance from healthy, in healthy standard deviations, of each fault under each "
+        "load by profile; a frame: the best, named.",
+    ).table(_winners(result))
+    report.section("Effect sizes").figure(
+        _effects_figure(result),
+        "Distance from healthy in healthy standard deviations, with the intervals that hold "
+        "together over the table. The load opposes motion.",
+    )
+    if result.impacts:
+        _add_impacts(report, result)
+    spread = (("Property", "property"), ("Deviation", "deviation"), ("Why this much", "reason"))
+    report.section(
+        "Healthy population",
+        "Nothing of it is printed: every spread is ASSUMED. Deviations are in SI units or shares "
+        "of the actuator file's value; all groups, healthy and faulty, are drawn from it.",
+    ).table(table_of(spread_rows(), spread))
+    report.section("All rows").table(
+        table_of(result.rows, _ROWS, "Every fault, load and profile.", digits=4)
+    )
+    command = (
+        f"nasa-separation --reassemblies {result.reassemblies} --healthy {result.healthy} "
+        f"--seed {result.seed}"
+    )
+    made = {"Parameter hash": result.meta["parameter_hash"], "Seed": result.seed,
+            "Core": result.meta["version"]}  # fmt: skip
+    return with_end(report, result.checks, command, made)
+
+
+_ROWS: tuple[Column, ...] = (
+    ("Fault", "fault"),
+    ("Profile", "profile"),
+    ("Load [N]", "load", ".0f"),
+    ("Feature", "feature"),
+    ("Unit", "unit"),
+    ("Healthy", "healthy"),
+    ("Faulty", "faulty"),
+    ("Effect", "effect.size", "+.2f"),
+    ("from", "effect.low", "+.2f"),
+    ("to", "effect.high", "+.2f"),
+    ("Half severity", lambda row: row.half.size if row.half else None, "+.2f"),
+    ("Best", lambda row: "yes" if row.winner else ""),
+)
+
+
+def _add_impacts(report: Report, result: SeparationResult) -> None:
+    """Add what the gap does to the load cell."""
+    columns = (
+        ("Profile", "profile"),
+        ("Load [N]", "load", ".0f"),
+        ("Excess of the peak [N]", "excess", ".0f"),
+        ("from [N]", "low", ".0f"),
+        ("to [N]", "high", ".0f"),
+    )
+    caption = "Peak of the load cell with the gap less without, 95 % intervals."
+    report.section(
+        "The gap's impact",
+        "The paper calls the triangular profile well suited for backlash. That holds without load; "
+        "under a load that opposes motion the trapezoid, whose rest lets the joint relax, hits "
+        "harder.",
+    ).figure(
+        _impacts_figure(result.traces),
+        "Load cell of the nominal actuator about the first reversal, healthy and with a gap of "
+        "0.5 mm; time from the corner of the command.",
+    ).table(table_of(result.impacts, columns, caption))
+
+
+def _impacts_figure(traces: Sequence[ImpactTrace]) -> Figure:
+    places = dict.fromkeys((trace.load, trace.profile) for trace in traces)
+    with new_figure(2, 2, height=4.6, sharex=True) as (figure, axes):
+        for panel, (load, shape) in zip(axes.flat, places, strict=False):
+            for trace in traces:
+                if (trace.load, trace.profile) == (load, shape):
+                    colour, label = (RED, "gap 0.5 mm") if trace.gap else (GREY, "healthy")
+                    panel.plot(1e3 * trace.time, trace.force, lw=1, color=colour, label=label)
+            panel.set_title(f"{shape}, {load:.0f} N", fontsize=9)
+        for panel in axes[1]:
+            panel.set(xlabel="Time [ms]")
+        for panel in axes[:, 0]:
+            panel.set(ylabel="Load cell [N]")
+        axes[0, 0].legend(fontsize=8)
+    return figure
 
 
 def _groups(result: SeparationResult) -> dict[tuple[str, float], list[SeparationRow]]:
@@ -342,8 +428,9 @@ def _groups(result: SeparationResult) -> dict[tuple[str, float], list[Separation
     return groups
 
 
-def _winners(result: SeparationResult) -> list[list[object]]:
-    rows: list[list[object]] = []
+def _winners(result: SeparationResult) -> ReportTable:
+    """Return the best profile of each fault and load, and what would name one."""
+    rows = []
     for (fault, load), group in _groups(result).items():
         largest = max(group, key=lambda row: abs(row.effect.size))
         winner = next((row.profile for row in group if row.winner), None)
@@ -356,7 +443,16 @@ def _winners(result: SeparationResult) -> list[list[object]]:
              verdict, f"{abs(largest.effect.size):.3g}", f"{100 * largest.power:.0f} %",
              _draws_needed(largest, verdict)]
         )  # fmt: skip
-    return rows
+    headings = ("Fault", "Load [N]", "Feature", "Best profile", "Largest effect", "Power",
+                "Draws that would name one")  # fmt: skip
+    return ReportTable(
+        headings,
+        rows,
+        "Features: lines and rms of the current reference, peak of the load cell. Power: "
+        "probability that the intervals of the two largest effects part in another such "
+        f"experiment, were they as estimated; named from {100 * POWER:.0f} % on. Draws: of each "
+        "fault, with as many times more healthy units.",
+    )
 
 
 def _power_map(result: SeparationResult) -> Figure:
@@ -403,7 +499,7 @@ def _effects_figure(result: SeparationResult) -> Figure:
                 rows = [r for r in result.rows if r.fault == fault and r.profile == shape]
                 x = np.array([loads.index(r.load) for r in rows])
                 _bars(axes, x + (place - 0.5 * (len(shapes) - 1)) * 0.7 / len(shapes), rows)
-            axes.axhline(0.0, color=COLOURS["grey"], lw=0.8)
+            axes.axhline(0.0, color=GREY, lw=0.8)
             axes.set_title(fault, fontsize=9)
             axes.set_xticks(range(len(loads)), [f"{load:.0f} N" for load in loads])
         for axes in grid[:, 0]:
@@ -416,11 +512,11 @@ def _effects_figure(result: SeparationResult) -> Figure:
 def _bars(axes: Axes, x: np.ndarray, rows: list[SeparationRow]) -> None:
     """Draw the effects of one profile with their intervals; rounded corners have open marks."""
     shape = rows[0].profile
-    name, rounded, _ = shape.partition(_ROUNDED)
+    name, rounded, _ = shape.partition(ROUNDED)
     size = np.array([row.effect.size for row in rows])
     ends = np.array([[row.effect.low, row.effect.high] for row in rows]).T
     axes.errorbar(
         x, size, np.abs(ends - size), fmt="o", ms=3.5, lw=1, mew=1,
-        color=SHAPE_COLOURS.get(name, COLOURS["grey"]), label=shape,
+        color=SHAPE_COLOURS.get(name, GREY), label=shape,
         mfc="none" if rounded else None,
     )  # fmt: skip

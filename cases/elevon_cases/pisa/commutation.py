@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,15 @@ from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREY, ORANGE, table_of, with_end
 from elevon_cases.pisa.gear import ACTUATOR, COMMANDED
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 SEQUENCE = (
     (0b101, "a", "b"), (0b100, "a", "c"), (0b110, "b", "c"),
@@ -200,56 +207,93 @@ def checks_of(
     ]
 
 
-def page_values(result: CommutationResult) -> dict[str, object]:
-    """Return what the page draws: one electrical turn, some carrier periods, the longest short."""
+def commutation_page(result: CommutationResult, date: str | None = None) -> Report:
+    """Return the report: commutation, modulation, the shorted motor."""
+    report = Report(
+        "Commutation, modulation and shorted motor of the Pisa landing gear",
+        "The thesis's Figs. 2.6 to 2.8 and 5.4 from the switching model: a retraction recorded "
+        "faster than its carrier, and the phase currents of the nominal extension.",
+        date=date,
+    )
     value = Actuator.load(ACTUATOR).parameters.value
-    carriers = 6.0 * value("inverter.switching_period")
-    return {
-        "turn": _turn(result.window, value("motor.pole_pairs")),
-        "carrier": _carrier(result.window, carriers),
-        "short": _short(result),
-    }
+    columns = (
+        ("From [deg]", "begin_deg", ".0f"),
+        ("Hall a b c", "hall"),
+        ("High", "high"),
+        ("Low", "low"),
+        ("Other codes [%]", "wrong_percent", ".3f"),
+        ("Duty [%]", "duty_percent", ".2f"),
+        ("On [%]", "on_percent", ".2f"),
+    )
+    caption = "Retraction: the demand is negative. Duty and on-time in the second half of a sector."
+    report.section("As Figs. 2.6 and 2.7: commutation").figure(
+        _turn_figure(result.window, value("motor.pole_pairs")),
+        "One electrical turn: Hall sensors and phase currents.",
+    ).table(table_of(result.rows, columns, caption))
+    report.section("As Fig. 2.8: modulation").figure(
+        _carrier_figure(result.window, 6.0 * value("inverter.switching_period")),
+        "Voltage between the conducting legs over some carrier periods.",
+    )
+    report.section("As Fig. 5.4: the shorted motor").figure(
+        _short_figure(result),
+        f"Phase currents of the nominal extension; {len(result.pulses)} stretches of shorted "
+        "windings, the longest in the lower panel.",
+    )
+    return with_end(report, result.checks, "pisa-commutation")
 
 
-def _legs(**signals: Sequence[Floats]) -> list[dict[str, object]]:
-    """One entry a leg: its name and colour, and its part of each signal."""
-    return [
-        {"leg": leg, "colour": colour, **{name: lines[k] for name, lines in signals.items()}}
-        for k, (leg, colour) in enumerate(zip("abc", ("blue", "orange", "grey"), strict=True))
-    ]
+_LEGS = (("a", BLUE), ("b", ORANGE), ("c", GREY))
 
 
-def _of_legs(run: Recording, name: str) -> list[Floats]:
-    return [run[f"{name}_{leg}"].values for leg in "abc"]
-
-
-def _turn(run: Recording, poles: float) -> dict[str, object]:
+def _turn_figure(run: Recording, poles: float) -> Figure:
+    """Draw Hall sensors and currents over one electrical turn."""
     turned = np.degrees(poles * np.abs(run["motor_position"].values))
     first, last = np.searchsorted(run.clock().time, WINDOW).tolist()
     inside = np.flatnonzero(np.abs(turned[first:last] - turned[first]) < 360.0) + first
     degrees = electrical(run, poles)[0][inside]
     order = np.argsort(degrees)
-    hall, current = (
-        [line[inside][order] for line in _of_legs(run, name)] for name in ("hall", "current")
-    )
-    return {"degrees": degrees[order], "legs": _legs(hall=hall, current=current)}
+    with new_figure(2, 1, height=5.0, sharex=True) as (figure, (sensors, currents)):
+        for number, (leg, colour) in enumerate(_LEGS):
+            hall, current = (run[f"{name}_{leg}"].values[inside][order]
+                             for name in ("hall", "current"))  # fmt: skip
+            shown = 0.8 * hall - number
+            sensors.plot(degrees[order], shown, color=colour, drawstyle="steps-post")
+            currents.plot(degrees[order], current, color=colour, label=leg)
+        sensors.set_yticks([0.4, -0.6, -1.6], ["Hall a", "Hall b", "Hall c"])
+        currents.set(xlabel="Electrical angle [deg]", ylabel="Current [A]", xlim=(0.0, 360.0))
+        currents.set_xticks(range(30, 360, 60))
+        currents.legend(loc="upper right", ncols=3)
+    return figure
 
 
-def _carrier(run: Recording, span: float) -> dict[str, object]:
+def _carrier_figure(run: Recording, span: float) -> Figure:
+    """Draw voltages and demand over some carrier periods."""
     time = run.clock().time
     inside = (time > WINDOW[0]) & (time < WINDOW[0] + span)
-    return {
-        "time": 1e3 * (time[inside] - WINDOW[0]),
-        "legs": _legs(voltage=[line[inside] for line in _of_legs(run, "voltage")]),
-        "demand": run["duty"].values[inside] * run["supply_voltage"].values[inside],
-    }
+    shown = 1e3 * (time[inside] - WINDOW[0])
+    with new_figure(height=3.2) as (figure, axes):
+        for leg, colour in _LEGS:
+            voltage = run[f"voltage_{leg}"].values[inside]
+            axes.plot(shown, voltage, color=colour, lw=1.0, label=f"phase {leg}")
+        demand = run["duty"].values[inside] * run["supply_voltage"].values[inside]
+        axes.plot(shown, demand, "k--", lw=1.0, label="demand")
+        axes.set(xlabel="Time [ms]", ylabel="Voltage [V]")
+        axes.legend(loc="upper right", ncols=4)
+    return figure
 
 
-def _short(result: CommutationResult) -> dict[str, object]:
+def _short_figure(result: CommutationResult) -> Figure:
+    """Draw the phase currents of the extension, and the longest short."""
     run, time = result.extension, result.extension.clock().time
     longest = max(result.pulses, key=lambda pulse: pulse.length, default=None)
     middle = 0.0 if longest is None else longest.time
     close = (time > middle - 0.003) & (time < middle + 0.006)
-    currents = _of_legs(run, "current")
-    legs = _legs(current=[line[::4] for line in currents], close=[line[close] for line in currents])
-    return {"time": time[::4], "near": 1e3 * (time[close] - middle), "legs": legs}
+    with new_figure(2, 1, height=5.0) as (figure, (whole, near)):
+        for leg, colour in _LEGS:
+            current = run[f"current_{leg}"].values
+            whole.plot(time[::4], current[::4], color=colour, lw=0.6)
+            near.plot(1e3 * (time[close] - middle), current[close], color=colour, label=leg)
+        whole.set(xlabel="Time [s]", ylabel="Current [A]")
+        near.set(xlabel="Time from the short [ms]", ylabel="Current [A]")
+        near.legend(loc="upper right", ncols=3)
+    return figure

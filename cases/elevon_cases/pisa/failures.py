@@ -20,7 +20,9 @@ from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
 from elevon.recording.plot import code_names
+from elevon.report import Report, ReportTable
 from elevon.report.checks import Check, CheckedResult
+from elevon_cases.page import sentence, table_of, with_end
 from elevon_cases.pisa.gear import ACTUATOR
 
 RECORD = (
@@ -305,14 +307,51 @@ def summary(result: FailuresResult) -> tuple[list[str], list[list[str]]]:
     return ["phase", "faults", "fault shown", "warning shown", "silent", "unsafe"], rows
 
 
-def page_values(result: FailuresResult) -> dict[str, object]:
-    """Return what the page says beside the rows: counts, unsafe rows, rows by phase."""
+def failures_page(result: FailuresResult, date: str | None = None) -> Report:
+    """Return the report: what the unit found, what is unsafe, every case."""
     unsafe = [row for row in result.rows if not row.safe]
-    by_phase = [(p, [row for row in result.rows if row.phase == p.name]) for p in PHASES]
-    return {
-        "unsafe": unsafe,
-        "listed": sum(row.listed for row in unsafe),
-        "named": [f"{row.fault}, {row.phase}: {row.sensors or 'not listed'}" for row in unsafe],
-        "phases": [(phase, rows) for phase, rows in by_phase if rows],
-        "summary": [[row[0], *map(int, row[1:])] for row in summary(result)[1]],
-    }
+    listed = sum(row.listed for row in unsafe)
+    count = str(len(result.rows))
+    report = Report(
+        "Failure cases of the Pisa landing gear",
+        f"{count} cases at {result.fidelity} fidelity: every fault of the catalogue in every "
+        f"phase. The unit shows locked or retracted falsely in {len(unsafe)} of them, {listed} of "
+        "which no sensor could prevent.",
+        date=date,
+    )
+    report.fact("Cases", count, "fault, place and phase")
+    report.fact("Unsafe", str(len(unsafe)), "locked or retracted shown, and not true")
+    report.fact("of these listed", str(listed), "every sensor that could see it failed or agreed")
+    report.section("What the unit found").table(
+        ReportTable(
+            [sentence(heading) for heading in summary(result)[0]],
+            [[row[0], *map(int, row[1:])] for row in summary(result)[1]],
+            "Silent: no fault and no warning, because the move arrived or nothing moved.",
+        )
+    )
+    section = report.section("Unsafe cases")
+    if unsafe:
+        named = [f"{row.fault}, {row.phase}: {row.sensors or 'not listed'}" for row in unsafe]
+        section.table(table_of(unsafe, _COLUMNS)).points(named)
+    else:
+        section.text("None.")
+    section = report.section("All cases")
+    for phase in PHASES:
+        rows = [row for row in result.rows if row.phase == phase.name]
+        if rows:
+            folded = f"{sentence(phase.name)}: {len(rows)} faults"
+            section.table(table_of(rows, _COLUMNS, folded=folded, marked=lambda row: not row.safe))
+    made = {"Seed": result.seed, "Fidelity": result.fidelity}
+    return with_end(report, result.checks, f"pisa-failures --fidelity {result.fidelity}", made)
+
+
+_COLUMNS = (
+    ("Fault", "fault"),
+    ("Phase", "phase"),
+    ("Indicated", "indicated"),
+    ("True", "true_state"),
+    ("Safe", "safe"),
+    ("Found by", "detected_by"),
+    ("after [s]", "time_s", ".3f"),
+    ("Ram [mm]", "position_mm", ".1f"),
+)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -19,8 +19,15 @@ from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, RED, VIOLET, table_of, with_end
 from elevon_cases.pisa.gear import ACTUATOR, Stroke, run_strokes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 GRAVITY = 9.80665
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
@@ -81,6 +88,16 @@ class FrictionResult(CheckedResult):
     traces: Annotated[list[FrictionTrace], WORKING]
     tables: Annotated[dict[str, list[tuple[float, float]]], WORKING]
     """The set's own friction: kind and direction to pairs of mm/s and N."""
+
+    def of(self, quantity: str, direction: str = "") -> list[FrictionRow]:
+        """Return the rows of a quantity, of one direction where it is given."""
+        rows = [row for row in self.rows if row.quantity == quantity]
+        return [row for row in rows if direction in ("", row.direction)]
+
+    def both(self, released: bool, speed: float) -> list[FrictionTrace]:
+        """Return both directions of a test at a speed in mm/s."""
+        tests = [trace for trace in self.traces if trace.released == released]
+        return [trace for trace in tests if abs(trace.speed_mm_s - speed) < 1e-9]
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,35 +324,160 @@ def _checks(rows: Sequence[FrictionRow]) -> list[Check]:
     return checks
 
 
-def page_values(result: FrictionResult) -> dict[str, object]:
-    """Return what the page draws beside the rows: both directions of a test, each way's preload."""
-
-    def both(released: bool, speed: float) -> list[FrictionTrace]:
-        mine = [t for t in result.traces if t.released == released]
-        return [t for t in mine if abs(t.speed_mm_s - speed) < 1e-9]
-
-    return {
-        "efficiency": [row for row in result.rows if row.quantity == "efficiency"],
-        "both": both,
-        "thin": lambda trace: slice(10, None, max(1, trace.time.size // 1500)),
-        "preload": [_preload(result.rows, *way) for way in _WAYS],
-    }
-
-
-_WAYS = (("extension", "blue", 1.0), ("retraction", "orange", -1.0))
-
-
-def _preload(rows: Sequence[FrictionRow], way: str, colour: str, sign: float) -> dict[str, object]:
-    """Return the apparent efficiency over the speed, and over the friction force."""
-    eta, force = (
-        {r.speed_mm_s: r.recovered for r in rows if (r.quantity, r.direction) == (quantity, way)}
-        for quantity in ("preload_efficiency", "friction_ff")
+def friction_page(result: FrictionResult, date: str | None = None) -> Report:
+    """Return the report: efficiency, friction, harmonics, histories, every quantity."""
+    report = Report(
+        "Friction tests of the Pisa landing gear",
+        "Free fall (FF) and modified free fall (FFM) on the virtual rig at 1 to 10 mm/s in both "
+        "directions, and loaded retractions. Weight, friction, harmonics and efficiency are "
+        "recovered from the logs alone.",
+        date=date,
     )
-    speeds = sorted(speed for speed in eta if speed is not None)
-    return {
-        "way": way,
-        "colour": colour,
-        "speed": [sign * speed for speed in speeds],
-        "efficiency": [eta[speed] for speed in speeds],
-        "by_friction": sorted((force[speed], eta[speed]) for speed in speeds),
-    }
+    functional = [row for row in result.rows if row.quantity in ("efficiency", "mass")]
+    report.section("From the functional runs: weight and efficiency under load").figure(
+        _efficiency_figure(result), "Efficiency of the screw over its load (Fig. 4.9)."
+    ).table(table_of(functional, _COLUMNS, digits=4))
+    report.section(
+        "Mean friction",
+        "The tests end at 10 mm/s, the leg works at 24 to 50 mm/s. P adds values there with which "
+        "the simulation meets the measured peak speeds; ours are ASSUMED. Dashed: extrapolated.",
+    ).figure(
+        _mean_figure(result), "Mean friction: tested, and extrapolated (Figs. 3.47, 3.48, 4.3)."
+    )
+    report.section("Harmonics of the pitch").figure(
+        _harmonics_figure(result),
+        "Amplitudes of the first five harmonics: FF (Figs. 3.49, 4.4) and FFM (Fig. 3.50).",
+    ).figure(_spectra_figure(result), "Spectra of the friction, FF at 2 mm/s (Figs. 4.5 and 4.6).")
+    report.section(
+        "Efficiency at the preload",
+        "Eq. (40): the friction of an unloaded nut taken as that of its preload. Symmetric in both "
+        "directions, falling with the friction force.",
+    ).figure(_preload_figure(result), "Efficiency over speed (Fig. 4.7) and friction (Fig. 4.8).")
+    section = report.section("Histories of the tests")
+    for released, speed, figures in (
+        (True, 1.0, "3.23 to 3.28"),
+        (True, 4.0, "3.29 to 3.34"),
+        (False, 1.0, "3.35 to 3.40"),
+        (False, 3.0, "3.41 to 3.46"),
+    ):
+        kind = "FF" if released else "FFM"
+        section.figure(
+            _history_figure(result.both(released, speed)),
+            f"Friction, position and speeds, {kind} at {speed:g} mm/s (Figs. {figures}).",
+        )
+    folded = f"{len(result.rows)} quantities, put in and recovered"
+    report.section("All quantities").table(table_of(result.rows, _COLUMNS, digits=4, folded=folded))
+    return with_end(report, result.checks, "pisa-friction", {"Seed": result.seed})
+
+
+_COLUMNS = (
+    ("Quantity", "quantity"),
+    ("Direction", "direction"),
+    ("Speed [mm/s]", "speed_mm_s"),
+    ("Load [N]", "load_n"),
+    ("Put in", "put_in"),
+    ("Recovered", "recovered"),
+    ("Unit", "unit"),
+)
+_WAYS = (("extension", BLUE, 1.0), ("retraction", ORANGE, -1.0))
+_HARMONIC_COLOURS = (BLUE, ORANGE, GREEN, RED, VIOLET)
+
+
+def _efficiency_figure(result: FrictionResult) -> Figure:
+    rows = result.of("efficiency")
+    loads = [row.load_n for row in rows]
+    with new_figure(height=3.0) as (figure, axes):
+        axes.plot(loads, [row.put_in for row in rows], color=BLUE, label="put in")
+        recovered = [row.recovered for row in rows]
+        axes.plot(loads, recovered, "x", color=ORANGE, label="recovered")
+        axes.set(xlabel="Load [N]", ylabel="Efficiency of the screw", ylim=(0.5, 0.8))
+        axes.legend()
+    return figure
+
+
+def _mean_figure(result: FrictionResult) -> Figure:
+    """Draw the set's friction up to the tests' speeds and beyond, and what was recovered."""
+    end = max(SPEEDS)
+    with new_figure(2, 1, height=5.0) as (figure, panels):
+        for axes, kind in zip(panels, ("ffm", "ff"), strict=True):
+            for way, colour, _ in _WAYS:
+                table = np.array(result.tables[f"{kind}_{way}"])
+                tested, beyond = table[table[:, 0] <= end], table[table[:, 0] >= end]
+                axes.semilogx(*tested.T, color=colour, label=f"{way}, put in")
+                axes.semilogx(*beyond.T, "--", color=colour, label="extrapolated")
+                rows = result.of(f"friction_{kind}", way)
+                speeds = [row.speed_mm_s for row in rows]
+                axes.plot(speeds, [row.recovered for row in rows], "x", color=colour)
+            axes.axvline(end, color=GREY, lw=0.8)
+            axes.set(ylabel=f"{kind.upper()} [N]", ylim=(0, None))
+            axes.legend(ncols=2, loc="upper left")
+        panels[-1].set(xlabel="Ram speed [mm/s]")
+    return figure
+
+
+def _harmonics_figure(result: FrictionResult) -> Figure:
+    with new_figure(2, 1, height=5.0, sharex=True) as (figure, panels):
+        for axes, quantity, kind in zip(
+            panels, ("harmonic", "harmonic_ffm"), ("FF", "FFM"), strict=True
+        ):
+            for number, colour in enumerate(_HARMONIC_COLOURS, 1):
+                rows = result.of(f"{quantity}_{number}")
+                line = sorted((row.speed_mm_s or 0.0, row.put_in) for row in rows)
+                axes.plot(*zip(*line, strict=True), color=colour, label=f"harmonic {number}")
+                speeds = [row.speed_mm_s for row in rows]
+                axes.plot(speeds, [row.recovered for row in rows], "x", color=colour)
+            axes.set(ylabel=f"{kind}, amplitude [N]", ylim=(0, None))
+        panels[0].legend(ncols=3)
+        panels[-1].set(xlabel="Ram speed [mm/s]")
+    return figure
+
+
+def _spectra_figure(result: FrictionResult) -> Figure:
+    with new_figure(1, 2, height=3.0, sharey=True) as (figure, panels):
+        for axes, (way, colour, _), trace in zip(
+            panels, _WAYS, result.both(True, 2.0), strict=True
+        ):
+            axes.stem(trace.order, trace.amplitude_n, linefmt=colour, markerfmt="o", basefmt=" ")
+            axes.set(xlabel="Periods a turn of the screw", title=way, ylim=(0, None))
+        panels[0].set(ylabel="Amplitude [N]")
+    return figure
+
+
+def _preload_figure(result: FrictionResult) -> Figure:
+    """Draw the apparent efficiency over the speed, and over the friction force."""
+    with new_figure(1, 2, height=3.2, sharey=True) as (figure, (over_speed, over_friction)):
+        for way, colour, sign in _WAYS:
+            eta, force = (
+                {row.speed_mm_s: row.recovered for row in result.of(quantity, way)}
+                for quantity in ("preload_efficiency", "friction_ff")
+            )
+            speeds = sorted(speed for speed in eta if speed is not None)
+            signed, values = [sign * speed for speed in speeds], [eta[speed] for speed in speeds]
+            over_speed.plot(signed, values, "x-", color=colour, label=way)
+            pairs = sorted((force[speed], eta[speed]) for speed in speeds)
+            over_friction.plot(*zip(*pairs, strict=True), "x-", color=colour)
+        over_speed.set(xlabel="Ram speed, positive extends [mm/s]", ylabel="Efficiency")
+        over_speed.legend()
+        over_friction.set(xlabel="Friction, FF [N]")
+    return figure
+
+
+def _history_figure(both: Sequence[FrictionTrace]) -> Figure:
+    """Draw friction, position and speeds of one test in both directions."""
+    shown = (
+        ("friction_n", "Friction [N]"),
+        ("position_mm", "Ram [mm]"),
+        ("ram_mm_s", "Ram [mm/s]"),
+        ("motor_rad_s", "Motor [rad/s]"),
+    )
+    with new_figure(4, 1, height=6.2, sharex=True) as (figure, panels):
+        for axes, (name, label) in zip(panels, shown, strict=True):
+            width = {"lw": 0.8} if name == "friction_n" else {}
+            for trace, (way, colour, _) in zip(both, _WAYS, strict=True):
+                thin = slice(10, None, max(1, trace.time.size // 1500))
+                values = getattr(trace, name)[thin]
+                axes.plot(trace.time[thin], values, color=colour, label=way, **width)
+            axes.set(ylabel=label)
+        panels[0].legend(loc="center right")
+        panels[-1].set(xlabel="Time [s]")
+    return figure

@@ -9,15 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, table_of, with_end
 from elevon_cases.pisa.gear import Stroke, run_strokes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 TEMPERATURES = (-40.0, 20.0, 70.0)
 FACTORS = (0.0, 1.0, 1.5, 3.5)
@@ -194,3 +201,49 @@ def _checks(rows: Sequence[HydraulicRow]) -> list[Check]:
                   at_least=True),
         ]  # fmt: skip
     return checks
+
+
+def hydraulic_page(result: HydraulicResult, date: str | None = None) -> Report:
+    """Return the report of both actuators."""
+    report = Report(
+        "Open-loop hydraulics and controlled speed",
+        "Speed of the ram in mid-stroke over load and temperature: a hydraulic cylinder behind a "
+        "restrictor, and the electromechanical actuator under its speed control.",
+        date=date,
+    )
+    columns = (
+        ("Temperature [C]", "temperature_c", ".0f"),
+        ("Load factor", "nz", ".1f"),
+        ("Direction", "direction"),
+        ("Hydraulic [mm/s]", "hydraulic_mm_s", ".1f"),
+        ("Electromechanical [mm/s]", "electric_mm_s", ".1f"),
+        ("Winding alone [mm/s]", "electric_winding_mm_s", ".1f"),
+        ("Current [A]", "electric_a", ".1f"),
+        ("Winding alone [A]", "electric_winding_a", ".1f"),
+    )
+    report.section("Speeds").figure(
+        _speeds_figure(result), "Speed over load factor, one line a temperature."
+    ).text(
+        "Temperature reaches the oil, and in the electromechanical actuator the winding, the "
+        "friction tables and the efficiencies (curves ASSUMED, set pisa-landing-gear). With the "
+        "winding alone cold would help the motor, and the small spread would be so by "
+        "construction."
+    ).table(table_of(result.rows, columns, "Extension aids the load, retraction lifts it."))
+    return with_end(report, result.checks, "pisa-hydraulic")
+
+
+def _speeds_figure(result: HydraulicResult) -> Figure:
+    with new_figure(1, 2) as (figure, both):
+        for axes, direction in zip(both, ("extension", "retraction"), strict=True):
+            for temperature, colour in zip(result.temperatures, (BLUE, ORANGE, GREEN), strict=True):
+                place = (direction, temperature)
+                rows = [r for r in result.rows if (r.direction, r.temperature_c) == place]
+                factors, label = [row.nz for row in rows], f"hydraulic, {temperature:g} C"
+                speeds = [row.hydraulic_mm_s for row in rows]
+                axes.plot(factors, speeds, "o-", ms=3, color=colour, label=label)
+                axes.plot(factors, [row.electric_mm_s for row in rows], "x--", color=colour)
+            axes.set(xlabel="Load factor", title=direction, ylim=(0, None))
+        both[0].set(ylabel="Ram speed [mm/s]")
+        both[0].plot([], [], "x--", color=GREY, label="electromechanical, 28 V")
+        both[0].legend()
+    return figure

@@ -20,7 +20,11 @@ from elevon.errors import Interrupted
 from elevon.plain import Plain
 from elevon.progress import Progress, part
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, verdict
+from elevon.report.figures import new_figure
+from elevon.units import display_unit, to_display
+from elevon_cases.page import GREY, ORANGE, Column, sentence, table_of, with_end
 from elevon_cases.pisa.gear import ACTUATOR, CONDITIONS, Condition
 
 SECONDS = {"extend": 14.0, "retract": 16.0}
@@ -387,3 +391,59 @@ def _speeds(
         return [np.concatenate(parts) for parts in zip(*by_log, strict=True)]
 
     return errors
+
+
+def validation_page(result: ValidationResult, date: str | None = None) -> Report:
+    """Return the report: errors, what was tuned, every stroke."""
+    report = Report(
+        "Predicted and measured strokes of the Pisa landing gear",
+        "The thesis draws measured and simulated position, speed and current and prints no error; "
+        "its signals were not published. Measured here means our virtual rig with a mismatch that "
+        "the model does not know (friction, temperature, EMF constant, efficiency, load control, "
+        "sensors). The model is tuned on the strokes of two conditions, as the thesis tunes its "
+        "own, and judged on the others. It shows the way, not how good the thesis's model is.",
+        date=date,
+    )
+    caption = (
+        "Percent of the measured signal's RMS about its mean, and of its range. Judged: position "
+        f"over its range, speed over its RMS, current as means over {MEAN:g} s over their RMS. "
+        "Repetition: the same actuator's strokes twice, which no model can be below: the software "
+        "brake's pulses have other instants each time."
+    )
+    report.section("Errors").table(table_of(result.rows, _COLUMNS, caption))
+    tuned: tuple[Column, ...] = (
+        ("Friction", lambda item: item[0]),
+        ("Before [N]", lambda item: item[1][0], ".0f"),
+        ("Tuned [N]", lambda item: item[1][1], ".0f"),
+    )
+    report.section("What was tuned").table(table_of(result.friction.items(), tuned))
+    shown = (
+        ("output_position", "Position [mm]", 1e3),
+        ("motor_speed", "Motor speed [rad/s]", 1.0),
+        ("torque_current", "Current [A]", 1.0),
+    )
+    for trace in result.traces:
+        with new_figure(3, 1, height=5.4, sharex=True) as (figure, panels):
+            for axes, (signal, label, scale) in zip(panels, shown, strict=True):
+                axes.plot(trace.time, scale * trace.measured[signal], color=GREY, lw=3.0)
+                axes.plot(trace.time, scale * trace.simulated[signal], color=ORANGE, lw=1)
+                axes.set_ylabel(label)
+            panels[-1].set_xlabel("Time [s]")
+        report.section(sentence(trace.log)).figure(figure, "Virtual rig (grey) and model (orange).")
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"pisa-validation --seed {result.seed}", made)
+
+
+_COLUMNS: tuple[Column, ...] = (
+    ("Stroke", "stroke"),
+    ("Held out", "held_out"),
+    ("Signal", lambda row: row.signal.replace("_", " ")),
+    ("RMS error", lambda row: to_display(row.rms, display_unit(row.unit)), ".3g"),
+    ("Unit", lambda row: display_unit(row.unit)),
+    ("% of RMS", "percent_of_rms", ".3g"),
+    ("% of range", "percent_of_range", ".3g"),
+    ("Judged [%]", "judged_percent", ".3g"),
+    ("Before tuning [%]", "before_percent", ".3g"),
+    ("Repetition [%]", "floor_percent", ".3g"),
+    ("Limit [%]", "limit_percent", ".3g"),
+)

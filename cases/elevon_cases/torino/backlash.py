@@ -13,13 +13,16 @@ from elevon.data import read_table
 from elevon.plain import fields_of
 from elevon.progress import Progress
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, verdict
 from elevon.report.figures import COLOURS, new_figure
+from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, table_of, with_end
 from elevon_cases.torino.backlash_estimate import backlash_from_encoder, flat_lengths, lost_motion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -310,33 +313,113 @@ def summary_figure(rows: Sequence[RowResult]) -> Figure:
     return figure
 
 
-def page_values(result: BacklashResult) -> dict[str, object]:
-    """Return what the page says and draws beside the rows."""
-    errors = np.array([row.error_deg for row in result.rows])
+def backlash_page(result: BacklashResult, date: str | None = None) -> Report:
+    """Return the report of the campaign."""
+    rows, answer = result.rows, result.to_dict()
+    worst = max(rows, key=lambda row: abs(row.error_deg) / row.limit_deg)
+    report = Report(
+        "Backlash of the Torino bench",
+        "Fifteen measured backlashes, put into the simulated actuator and recovered from its "
+        f"encoder alone. Largest error against its limit: row {worst.measured.row}, "
+        f"{abs(worst.error_deg):.4f} of {worst.limit_deg:.4f} deg.",
+        date=date,
+    )
+    rms = np.sqrt(np.mean(np.square([row.error_deg for row in rows])))
+    gap = min(row.formula_deg - row.backlash_in_deg for row in rows)
+    report.fact("Error of recovery", f"{rms:.4f} deg", "RMS, fifteen rows")
+    report.fact("Encoder count", f"{result.encoder_count_deg:.4f} deg", "at the output side")
+    report.fact("Formula less measured", f"{gap:+.2f} deg", "largest, at the widest spacing")
+    report.fact("Simulated", f"{answer['sim_s']:.0f} s", f"{len(rows) + 1} runs, 1 us steps")
+    section = report.section(
+        "Measured, calculated, simulated",
+        "The formula is that of ideal teeth. Above some 2 mm of spacing the printed gears' flanks "
+        "are no involutes any more and the bench shows more backlash than the formula.",
+    )
+    section.figure(summary_figure(rows), "Total backlash against the spacing of the gears.")
+    section.table(table_of(rows, _COLUMNS, "Total backlash at the output side."))
+    section.figure(
+        _error_figure(rows),
+        "Error of the recovered backlash; the band is one count and 2 % of the backlash.",
+    )
+    report.section(
+        "What the encoder sees",
+        "While the gap is crossed the encoder stands still. The loop, closed on the encoder, "
+        "drives the motor on: it overshoots by the backlash; the flat ends with a step in speed.",
+    ).figure(
+        _traces_figure(result),
+        "Rows 1, 7 and 14: command, motor divided by the gear ratio, encoder. Above one period "
+        f"after {START:g} s, below its top.",
+    )
+    report.section(
+        "How the backlash is recovered",
+        "From encoder signals only. Over half a period, from before one reversal to before the "
+        "next, the motor turns the encoder's own travel plus the backlash. The loop's integral "
+        "action makes the time integral of command less encoder, times the position gain, equal "
+        "to that travel, up to what friction takes to turn round. The same command without "
+        "backlash (a blank run) takes the same for friction. So the backlash is the position gain "
+        "times the area between the two encoder signals over half a period: no inertia, friction "
+        f"or timing enters. The areas of the reversals after {START:g} s are averaged; a count is "
+        f"{result.encoder_count_deg:g} deg.",
+        "Second estimate, for comparison: the range of motor position less encoder, which a bench "
+        "with a motor sensor sees directly, to within a count.",
+    )
+    made = {"Parameter hash (no backlash)": answer["parameter_hash"], "Seed": answer["seed"],
+            "Core": answer["version"]}  # fmt: skip
+    return with_end(report, result.checks, "torino-backlash", made)
+
+
+_COLUMNS = (
+    ("Row", "measured.row", "d"),
+    ("Micrometer [mm]", "measured.micrometer_mm", ".2f"),
+    ("Measured [deg]", "measured.measured_total_deg", ".4f"),
+    ("Formula [deg]", "formula_deg", ".4f"),
+    ("Put in [deg]", "backlash_in_deg", ".4f"),
+    ("Recovered [deg]", "backlash_out_deg", ".4f"),
+    ("Error [deg]", "error_deg", "+.4f"),
+    ("Limit [deg]", "limit_deg", ".4f"),
+    ("Motor less encoder [deg]", "lost_motion_deg", ".4f"),
+    ("Flat [s]", "flat_s", ".3f"),
+)
+
+
+def _error_figure(rows: Sequence[RowResult]) -> Figure:
+    put_in = [row.backlash_in_deg for row in rows]
+    limit = np.array([row.limit_deg for row in rows])
+    with new_figure(height=2.6) as (figure, axes):
+        axes.fill_between(put_in, -limit, limit, color=GREEN, alpha=0.15, lw=0)
+        axes.axhline(0.0, color=GREY, lw=0.8)
+        errors, spread = [row.error_deg for row in rows], [row.spread_deg for row in rows]
+        axes.errorbar(put_in, errors, spread, fmt="o", ms=4.5, lw=1, color=ORANGE)
+        axes.set(xlabel="Backlash put in [deg]", ylabel="Error [deg]")
+    return figure
+
+
+def _traces_figure(result: BacklashResult) -> Figure:
+    """Draw one period of the displayed rows, and its top."""
     period = 1.0 / FREQUENCY
-    return {
-        "answer": result.to_dict(),
-        "worst": max(result.rows, key=lambda row: abs(row.error_deg) / row.limit_deg),
-        "rms": np.sqrt(np.mean(errors**2)),
-        "gap": min(row.formula_deg - row.backlash_in_deg for row in result.rows),
-        "summary": summary_figure,
-        "limit": np.array([row.limit_deg for row in result.rows]),
-        "wholes": [_trace(result, row, START, START + period) for row in DISPLAYED],
-        "tops": [_trace(result, row, START + 0.2 * period, START + 0.42 * period)
-                 for row in DISPLAYED],
-    }  # fmt: skip
+    with new_figure(2, 3, width=9.0, height=5.6) as (figure, axes):
+        for place, number in enumerate(DISPLAYED):
+            whole, top = axes[:, place]
+            _draw_row(whole, result, number, START, START + period)
+            _draw_row(top, result, number, START + 0.2 * period, START + 0.42 * period)
+            backlash = result.rows[number - 1].backlash_in_deg
+            whole.set(title=f"Row {number}: {backlash:.2f} deg", ylim=(1.0, 19.0))
+            top.set(xlabel="Time [s]", ylim=(14.2, 18.8))
+        for row in axes:
+            row[0].set(ylabel="Position at the output [deg]")
+        axes[0, 0].legend(loc="lower left")
+    return figure
 
 
-def _trace(result: BacklashResult, number: int, start: float, stop: float) -> dict[str, object]:
-    """Return a part of a row's signals [deg] at the output."""
+def _draw_row(axes: Axes, result: BacklashResult, number: int, start: float, stop: float) -> None:
+    """Draw a part of a row's signals at the output."""
     recording = result.recordings[number - 1]
     time = recording["encoder_position"].time
     window = (time >= start) & (time < stop)
-    lines = {
-        "command": recording["command"].values,
-        "motor": recording["motor_position"].values / result.gear_ratio,
-        "encoder": recording["encoder_position"].values,
-    }
-    backlash = result.rows[number - 1].backlash_in_deg
-    degrees = {name: np.degrees(values[window]) for name, values in lines.items()}
-    return {"title": f"Row {number}: {backlash:.2f} deg", "time": time[window], **degrees}
+    for name, ratio, colour, width, label in (
+        ("command", 1.0, GREY, 1.0, "command"),
+        ("motor_position", result.gear_ratio, BLUE, 1.2, "motor / ratio"),
+        ("encoder_position", 1.0, ORANGE, 1.6, "encoder"),
+    ):
+        angle = np.degrees((recording[name].values / ratio)[window])
+        axes.plot(time[window], angle, color=colour, lw=width, label=label)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,14 @@ from elevon.calibrate.slips import Slip, WeightDrop, find_slips, printed_drops
 from elevon.errors import InputError
 from elevon.estimate.regression import huber
 from elevon.plain import fields_of
+from elevon.report import Report
 from elevon.report.checks import Check, verdict
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREY, ORANGE, RED, table_of, with_end
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 GUIDE_RADIUS_M = 0.08
 """Radius of the winding guide (160 mm across), thesis Table 5.1 set-up."""
@@ -215,27 +222,119 @@ def _columns(drops: Sequence[WeightDrop]) -> tuple[Floats, Floats]:
     )
 
 
-def page_values(result: ComplianceResult) -> dict[str, object]:
-    """Return stiffness and interval [N m/rad], and what the page draws over the load."""
-    fit, (low, high) = result.robust, result.interval
+def compliance_page(result: ComplianceResult, seed: int = 0, date: str | None = None) -> Report:
+    """Return the report of the forty drops."""
+    low, high = (end * NM_PER_RAD for end in result.interval)
+    stiffness = result.robust.stiffness * NM_PER_RAD
+    report = Report(
+        "Stiffness of the Torino transmission",
+        f"Forty drops of a weight give {stiffness:.0f} N m/rad at the output shaft, 95 % interval "
+        f"{low:.0f} to {high:.0f}. The published {PUBLISHED_N_PER_DEG} is the other regression.",
+        date=date,
+    )
+    report.fact("Stiffness", f"{stiffness:.0f} N m/rad", f"{low:.0f} to {high:.0f}, 95 %")
+    robust = f"{result.robust.stiffness:.1f} N/deg"
+    report.fact("Robust fit", robust, "loss on load, repaired rows")
+    report.fact("As published", f"{PUBLISHED_N_PER_DEG} N/deg", "load on loss; printed as N m/deg")
+    wrong = f"{len(result.rows_inconsistent)} of {len(result.printed)}"
+    report.fact("Rows wrong", wrong, f"and {len(result.rows_swapped)} with swapped columns")
+    report.section(
+        "What is wrong in the printed rows",
+        "The encoder came back to the same few end positions and the motor never stopped twice at "
+        "the same place: a motor column that holds an encoder position is a swapped column. All "
+        "weights pull one way: a motor end of the other sign has lost its minus. And the printed "
+        "loss is the distance between the two positions of its row, or it is not that row's.",
+    ).table(
+        table_of(result.slips, (("Row", "row"), ("Slip", "kind"), ("Evidence", "reason")))
+    ).text(
+        "Swapping columns changes no loss that is taken as a distance. It turns the sign of a loss "
+        "taken as encoder minus motor, and ruins both regressions (fourth line of the next table)."
+    )
+    _add_regressions(report, result)
+    _add_answer(report, result, low, high)
+    return with_end(report, result.checks, "torino-compliance", {"Bootstrap seed": seed})
+
+
+def _add_regressions(report: Report, result: ComplianceResult) -> None:
+    """Add what each reading of the table gives by each estimator."""
+    columns = (
+        ("Rows used", "name"),
+        ("Rows", "rows", "d"),
+        ("Load on loss", "load_on_loss", ".2f"),
+        ("Loss on load", "loss_on_load", ".2f"),
+        ("Theil-Sen", "theil_sen", ".2f"),
+        ("r squared", "r2", ".3f"),
+    )
+    report.section(
+        "Which regression",
+        "The load was set and is known to its printed digits; the scatter is in the measured "
+        "angle. So the loss is regressed on the load and the stiffness is the inverse of that "
+        "slope. Regressing the load on the loss gives a slope that is too small by the squared "
+        f"correlation (here {result.variants[0].r2:.3f}), whatever the number of drops. Allowing "
+        "errors in both, with the load's printed rounding against the angle's scatter, gives "
+        f"{result.deming:.1f} N/deg: the load's own error does not matter.",
+    ).table(
+        table_of(
+            result.variants,
+            columns,
+            "Stiffness in N/deg, by reading of the table and by estimator.",
+        )
+    ).text(
+        f"The second line gives {result.variants[1].load_on_loss:.2f}: the published "
+        f"{PUBLISHED_N_PER_DEG} was computed from the positions, and the losses of rows 3, 10 and "
+        "14 were slips of the print only."
+    ).figure(
+        _fits_figure(result),
+        "Loss against load: each repaired row (dots; a weight's first drop in orange), wrong "
+        "losses as printed (crosses), and the fits.",
+    )
+
+
+def _add_answer(report: Report, result: ComplianceResult, low: float, high: float) -> None:
+    fit, stiffness = result.robust, result.robust.stiffness * NM_PER_RAD
+    report.section(
+        "The answer",
+        f"The first drop of each weight starts from elsewhere and loses {fit.group_offsets[0]:.3f} "
+        "deg more; with that offset and Huber's weights the repaired rows give "
+        f"{fit.stiffness:.1f} N/deg, that is {math.radians(stiffness):.1f} N m/deg or "
+        f"{stiffness:.0f} N m/rad. Drawing whole weights with replacement gives {low:.0f} to "
+        f"{high:.0f} N m/rad (95 %). {fit.offset:.3f} deg are lost already at no load: backlash "
+        "and friction.",
+        "A straight line is not the whole truth: a quadratic term is significant (p = "
+        f"{result.curvature_p:.1g}), the transmission stiffens with load.",
+    ).points(
+        [
+            "ASSUMED: the printed load hangs on each of the two cables of the 160 mm guide, so the "
+            "torque is 0.16 m times the load. If it is the sum of both: "
+            f"{stiffness / 2:.0f} N m/rad.",
+            "The printed load is ten times the mass. In true newtons every stiffness is "
+            f"{100 * (1 - STANDARD_GRAVITY_FACTOR):.1f} % lower: "
+            f"{stiffness * STANDARD_GRAVITY_FACTOR:.0f} N m/rad.",
+        ]
+    )
+
+
+def _fits_figure(result: ComplianceResult) -> Figure:
+    fit, regression = result.robust, result.variants[0].load_on_loss
+    changed = [a for a, b in zip(result.printed, result.repaired, strict=True)
+               if (a.load_n, a.loss_deg) != (b.load_n, b.loss_deg)]  # fmt: skip
+    first = [drop for drop in result.repaired if drop.drop == 1]
+    later = [drop for drop in result.repaired if drop.drop != 1]
     load = np.array([0.0, 52.0])
-    printed_load, printed_loss = (column.mean() for column in _columns(result.printed))
-    return {
-        "stiffness": fit.stiffness * NM_PER_RAD,
-        "per_degree": fit.stiffness * NM_PER_RAD * np.pi / 180,
-        "low": low * NM_PER_RAD,
-        "high": high * NM_PER_RAD,
-        "changed": [a for a, b in zip(result.printed, result.repaired, strict=True)
-                    if (a.load_n, a.loss_deg) != (b.load_n, b.loss_deg)],
-        "first": [drop for drop in result.repaired if drop.drop == 1],
-        "later": [drop for drop in result.repaired if drop.drop != 1],
-        "lines": {
-            "load": load,
-            "robust": fit.offset + load / fit.stiffness,
-            "published": printed_loss
-            + (load - printed_load) / result.variants[0].load_on_loss,
-        },
-    }  # fmt: skip
+    mean_load, mean_loss = (column.mean() for column in _columns(result.printed))
+    robust = fit.offset + load / fit.stiffness
+    published = mean_loss + (load - mean_load) / regression
+    with new_figure(height=4.4) as (figure, axes):
+        axes.plot(*_columns(changed), "x", color=GREY, label="printed, wrong")
+        axes.plot(*_columns(later), "o", color=BLUE, ms=4.5, label="repaired")
+        axes.plot(*_columns(first), "o", color=ORANGE, ms=4.5, label="first drops")
+        axes.plot(load, robust, color=BLUE, label=f"robust, {fit.stiffness:.0f} N/deg")
+        axes.plot(load, robust + fit.group_offsets[0], "--", color=ORANGE, lw=1.2)
+        label = f"load on loss, {regression:.0f} N/deg"
+        axes.plot(load, published, ":", color=RED, label=label)
+        axes.set(xlabel="Load [N]", ylabel="Loss [deg]", xlim=(0, 52), ylim=(-0.05, 0.95))
+        axes.legend(loc="upper left", ncols=2)
+    return figure
 
 
 @dataclass(frozen=True, slots=True)

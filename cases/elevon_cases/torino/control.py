@@ -13,7 +13,10 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, ORANGE, table_of, with_end
 from elevon_cases.torino.bench_unit import ACTUATOR
 
 TIME, FILTER = 0.01, 1000.0
@@ -99,3 +102,34 @@ def reproduce_control(*, seed: int = 0, progress: Progress | None = None) -> Con
 def root_locus() -> Floats:
     """Return the root of ``1 + K G`` at each gain [1/s], shape of `GAINS`."""
     return np.array([np.roots([TIME / FILTER + gain * TIME, 1.0])[0] for gain in GAINS])
+
+
+def control_page(result: ControlResult, seed: int = 0, date: str | None = None) -> Report:
+    """Return the report of root locus and speeds."""
+    report = Report(
+        "Root locus of the derivative branch, no-load speed",
+        "The branch has one pole and a zero at the origin: its root runs along the real axis from "
+        "the one to the other as the gain grows.",
+        date=date,
+    )
+    with new_figure(1, 2, height=2.8) as (figure, (plane, growth)):
+        plane.plot(result.roots, 0.0 * GAINS, color=BLUE)
+        plane.plot(result.roots[:1], [0.0], "x", color=ORANGE, label="pole")
+        plane.plot([0.0], [0.0], "o", mfc="none", color=ORANGE, label="zero")
+        plane.set(xlabel="Real part [1/s]", ylabel="Imaginary part [1/s]")
+        plane.legend(loc="upper right", ncols=2)
+        growth.loglog(GAINS[1:], -result.roots[1:], color=BLUE)
+        growth.set(xlabel="Gain", ylabel="-Root [1/s]")
+    report.section("Root locus").figure(
+        figure, "Root of 1 + K G with the printed time and filter (Figure 52)."
+    )
+    columns = (
+        ("No-load speed of", "requirement"),
+        ("Required [deg/s]", "required_deg_s"),
+        ("Model [deg/s]", "speed_deg_s"),
+        ("Met", "met"),
+    )
+    caption = "Behind 1:124 the bench's drive, limited to 500 rpm, turns no faster."
+    report.section("No-load speed").table(table_of(result.rows, columns, caption, digits=4))
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"torino-control --seed {seed}", made)

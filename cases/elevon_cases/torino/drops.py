@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -26,7 +26,10 @@ from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
+from elevon.report import Report, ReportTable
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREY, ORANGE, with_end
 from elevon_cases.torino.bench_unit import (
     ACTUATOR,
     READINGS,
@@ -37,6 +40,10 @@ from elevon_cases.torino.bench_unit import (
     trace,
 )
 from elevon_cases.torino.validation import encoder_count
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 MASSES = (0.510, 1.000, 1.510, 2.010, 2.520, 3.020, 3.533, 4.031, 4.541, 5.042)
 """Printed: kg, each on both cables."""
@@ -342,12 +349,80 @@ def _loss_error(
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def page_values(_result: DropsResult) -> dict[str, object]:
-    """Return mean diameter and number of coils of the load module's springs over the wire [mm]."""
+def drops_page(result: DropsResult, date: str | None = None) -> Report:
+    """Return the report: both values, each weight, the springs of the load module."""
+    report = Report(
+        "From dropped weights to a model of the transmission",
+        "Ten weights, four drops each, on the virtual bench with hidden stiffness and damping. The "
+        "thesis tunes both by hand and prints 68.23, then 43, and 5.5, then 7.5, in units that do "
+        "not fit: nothing here can be held against them.",
+        date=date,
+    )
+    low, high = result.stiffness_interval
+    rows = [
+        ["stiffness [N m/rad]", result.hidden_stiffness, result.stiffness,
+         f"{low:.5g} to {high:.5g}"],
+        ["damping [N m s/rad]", result.hidden_damping, result.damping, ""],
+    ]  # fmt: skip
+    report.section("Stiffness and damping").table(
+        ReportTable(("Value", "Hidden", "Recovered", "Interval"), rows)
+    ).figure(
+        _fits_figure(result),
+        f"Angle lost over load, {len(MASSES)} weights; error over the damping.",
+    )
+    section = report.section("Each weight", "Motor and encoder about the drop, bench and model.")
+    for number, drop in enumerate(result.traces, 1):
+        section.figure(_drop_figure(drop), f"{drop.mass:g} kg (thesis, Figure 5.{number})")
+    section = report.section("Series block against the bench")
+    for drop in result.traces[-1:]:
+        section.figure(_drop_figure(drop, rigid=True), "Heaviest weight (Figures 6.1, 6.2)")
+    report.section("Springs of the load module").figure(
+        _springs_figure(),
+        "Diameter that the stress allows, and coils (thesis, Figures 4.3, 4.4); the printed choice "
+        "is marked.",
+    )
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"torino-drops --seed {result.seed}", made)
+
+
+def _fits_figure(result: DropsResult) -> Figure:
+    with new_figure(1, 2, height=3.0) as (figure, (lost, error)):
+        losses, torques = zip(*((r.loss_deg, r.torque_nm) for r in result.rows), strict=True)
+        lost.plot(losses, torques, "o", ms=3, color=BLUE)
+        lost.set(xlabel="Angle lost [deg]", ylabel="Torque at the output [N m]")
+        error.semilogx(*zip(*result.misfits, strict=True), "o-", ms=3, color=ORANGE)
+        error.set(xlabel=f"{DAMPING} [N m s/rad]", ylabel="Squared error [deg2]")
+    return figure
+
+
+def _drop_figure(drop: DropTrace, *, rigid: bool = False) -> Figure:
+    """Draw motor and encoder about one drop."""
+    with new_figure(1, 2, height=2.4) as (figure, both):
+        for place, (axes, name) in enumerate(zip(both, ("Motor", "Encoder"), strict=True)):
+            axes.plot(drop.time, drop.bench[place], color=GREY, lw=2.6, label="bench")
+            axes.plot(drop.time, drop.model[place], color=ORANGE, lw=1, label="model")
+            if rigid:
+                axes.plot(drop.time, drop.rigid[place], color=BLUE, lw=0.8, label="rigid")
+            axes.set(xlabel="Time [s]", ylabel=f"{name} [deg]")
+        both[0].legend(loc="best")
+    return figure
+
+
+def _springs_figure() -> Figure:
+    """Draw mean diameter and number of coils of the load module's springs over the wire."""
     from elevon.bench.spring import STANDARD_WIRES, SpringTask, design_spring
 
     task = SpringTask()
     wires = [float(wire) for wire in STANDARD_WIRES if 2e-3 <= wire <= 4e-3]
+    shown = 1e3 * np.array(wires)
     largest = 1e3 * np.array([task.largest_coil(wire) for wire in wires])
     coils = [design_spring(task, wire=wire).coils for wire in wires]
-    return {"springs": {"wire": 1e3 * np.array(wires), "largest": largest, "coils": coils}}
+    with new_figure(1, 2, height=2.8) as (figure, both):
+        for axes, values, printed, name in (
+            (both[0], largest, 34.0, "Largest mean diameter [mm]"),
+            (both[1], coils, 342.0, "Coils at 34 mm"),
+        ):
+            axes.plot(shown, values, "o-", ms=3, color=BLUE)
+            axes.plot([3.0], [printed], "s", color=ORANGE)
+            axes.set(xlabel="Wire [mm]", ylabel=name)
+    return figure

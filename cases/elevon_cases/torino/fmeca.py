@@ -16,7 +16,9 @@ from elevon.errors import InputError
 from elevon.logs.log import Log
 from elevon.plain import Plain
 from elevon.progress import Progress, part
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon_cases.page import Column, table_of, with_end
 from elevon_cases.torino.bench_unit import ACTUATOR, logs_of
 
 LEAST_CHANGE = 1.0
@@ -162,3 +164,30 @@ def _answer(log: Log, unit: Actuator, baseline: Log, fault: str) -> tuple[str, s
         return OTHER, text
     # Places of one kind differ by a phase that no log without the angle's zero tells.
     return (ALIKE if any(not name.startswith(causes[0].kind) for name in alike) else NAMED), text
+
+
+def fmeca_page(result: FmecaResult, date: str | None = None) -> Report:
+    """Return the report of the failure modes."""
+    named = sum(row.seen in (NAMED, ALIKE) for row in result.rows)
+    report = Report(
+        "Failure modes of an actuator, and what diagnosis sees of them",
+        "Each line of the printed table as faults of the catalogue, one log of 20 s each. "
+        f"{named} of {len(result.rows)} are named.",
+        date=date,
+    )
+    columns: tuple[Column, ...] = (
+        ("Component", "component"),
+        ("Failure mode", "mode"),
+        ("Rate [1/h]", lambda row: f"{row.rate_per_h:.3g}"),
+        ("Fault", "fault"),
+        ("Change [%]", "change_percent"),
+        ("Channel", lambda row: row.channel.replace("_", " ")),
+        ("Seen", "seen"),
+        ("Answer", "answer"),
+    )
+    caption = (
+        "Rates as printed, of a component; change: of a channel's RMS against the healthy log."
+    )
+    report.section("Failure modes").table(table_of(result.rows, columns, caption, digits=3))
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"torino-fmeca --seed {result.seed}", made)

@@ -14,7 +14,10 @@ from elevon.arrays import Floats
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress
 from elevon.recording import Recording
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREEN, ORANGE, table_of, with_end
 from elevon_cases.torino.bench_unit import ACTUATOR
 
 if TYPE_CHECKING:
@@ -232,3 +235,40 @@ def _rms(log: Recording, other: Recording) -> float:
     one, two = log["output_position"], other["output_position"]
     late = one.time >= PERIOD
     return math.degrees(float(np.sqrt(np.mean((one.values[late] - two.values[late]) ** 2))))
+
+
+def gear_page(result: GearResult, seed: int = 0, date: str | None = None) -> Report:
+    """Return the report of the three models."""
+    report = Report(
+        "The gear as planets, a backlash in each mesh",
+        "The paper lumps the gear's backlash at the output and leaves a multi-body gear to the "
+        "future (3.1.5). Here is that gear beside the single backlash of equal lost motion. How "
+        "the lost motion is shared by the meshes is ASSUMED: one backlash along all pitch circles.",
+        date=date,
+    )
+    models = (
+        ("Model", "model"),
+        ("Lost motion [deg]", "lost_motion_deg"),
+        ("Stiffness [N m/rad]", "stiffness_nm_per_rad"),
+        ("In the sine [deg]", "moving_deg"),
+        ("Loaded [deg]", "loaded_deg"),
+        ("Loaded, RMS to planets [deg]", "loaded_rms_deg"),
+    )
+    caption = "Pushed with the motor off; in the sine of 7 deg, 0.2 Hz, without and with friction."
+    section = report.section("Models").table(table_of(result.rows, models, caption))
+    with new_figure(width=6.0, height=2.8) as (figure, axes):
+        for model, colour in ((LUMPED, BLUE), (ELASTIC, ORANGE), (PLANETS, GREEN)):
+            axes.plot(result.time, result.curves[model], color=colour, label=model)
+        axes.set(xlabel="Time [s]", ylabel="Motor / 124 less output [deg]")
+        axes.legend(loc="upper right")
+    section.figure(figure, "One period of the sine under 1 N m of friction at the output.")
+    meshes = (
+        ("Mesh", "mesh"),
+        ("Reaches the output", "reaches_output"),
+        ("Lost motion there [deg]", "lost_motion_deg"),
+        ("Share of compliance [%]", "compliance_percent"),
+    )
+    caption = "The backlash at the fixed ring reaches the output whole, the sun's by one in 124."
+    report.section("Meshes").table(table_of(result.meshes, meshes, caption, digits=4))
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"torino-gear --seed {seed}", made)

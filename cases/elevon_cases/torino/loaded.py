@@ -17,7 +17,10 @@ from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.plain import Plain
 from elevon.progress import Progress, part
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREEN, ORANGE, Column, table_of, with_end
 from elevon_cases.torino.backlash_estimate import lost_motion
 from elevon_cases.torino.bench_unit import (
     ACTUATOR,
@@ -163,3 +166,39 @@ def _row(log: Log, model: Actuator, net: float, torque: float) -> LoadedRow:
 
 def _lost(time: Floats, motor: Floats, encoder: Floats) -> float:
     return math.degrees(lost_motion(time, motor, encoder, DROPPED))
+
+
+def loaded_page(result: LoadedCampaign, date: str | None = None) -> Report:
+    """Return the report of the campaign."""
+    report = Report(
+        "Loaded campaign of the Torino bench",
+        "A constant brake torque a test, linear from 0.2 to 2 N m, at three backlashes; the first "
+        "period is dropped. The bench is the virtual one with hidden values; the model was "
+        "calibrated on other logs.",
+        date=date,
+    )
+    with new_figure(1, 2, height=3.2) as (figure, (torques, currents)):
+        for net, colour in zip(NET, (BLUE, ORANGE, GREEN), strict=True):
+            tests = [row for row in result.rows if row.net_backlash_rad == net]
+            cell, label = [row.cell_nm for row in tests], f"{math.degrees(net):.2f} deg net"
+            torques.plot(range(1, len(tests) + 1), cell, "o", ms=4, color=colour, label=label)
+            currents.plot(cell, [row.current_a for row in tests], "o", ms=4, color=colour)
+        torques.set(xlabel="Test", ylabel="Brake torque by the cell [N m]")
+        torques.legend(loc="upper left")
+        currents.set(xlabel="Brake torque by the cell [N m]", ylabel="Mean torque current [A]")
+    report.section("Torque and current").figure(
+        figure, "Torques of the tests (thesis, Figure 84) and the current they cost."
+    )
+    columns: tuple[Column, ...] = (
+        ("Net backlash [deg]", lambda row: math.degrees(row.net_backlash_rad)),
+        ("Set [N m]", "set_nm"),
+        ("Cell [N m]", "cell_nm"),
+        ("Current [A]", "current_a"),
+        ("Bench lost [deg]", "bench_lost_deg"),
+        ("Model lost [deg]", "model_lost_deg"),
+        ("Position error [% of range]", "position_percent"),
+    )
+    caption = "After the first period."
+    report.section("Tests").table(table_of(result.rows, columns, caption, digits=4))
+    command = f"torino-loaded --fidelity {result.fidelity} --seed {result.seed}"
+    return with_end(report, result.checks, command, {"Parameter hash": result.parameter_hash})

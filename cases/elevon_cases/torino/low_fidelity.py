@@ -11,9 +11,10 @@ from elevon.actuator import Actuator
 from elevon.compare import Comparison, compare, comparison_figures, default_scenario, filtered
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
-from elevon.report import Check
+from elevon.report import Check, Report
 from elevon.report.checks import CheckedResult
 from elevon.scenario import Scenario
+from elevon_cases.page import Column, sentence, table_of, with_end
 
 POSITION_LIMIT = 0.005
 CURRENT_LIMIT = 0.05
@@ -153,6 +154,24 @@ def _row(name: str, comparison: Comparison, floor: float | None) -> CaseRow:
     )
 
 
-def page_values(_result: object) -> dict[str, object]:
-    """Return what the page of the three cases has beside its result."""
-    return {"figures": comparison_figures}
+def low_fidelity_page(result: LowFidelityResult, seed: int = 0, date: str | None = None) -> Report:
+    """Return the report of the three cases."""
+    report = Report(
+        f"Reduced-order and switching model of {result.actuator}",
+        "Both models on the loaded campaign's sine, position and speed as the paper draws them "
+        "(Figures 6 and 7). The paper prints no error.",
+        date=date,
+    )
+    columns: tuple[Column, ...] = (
+        ("Case", "name"),
+        ("Position", lambda row: 100.0 * row.position_nrmse),
+        ("Speed", lambda row: 100.0 * row.speed_nrmse),
+        ("Torque current", lambda row: 100.0 * row.q_current_nrmse),
+    )
+    caption = "Percent: RMS difference over the amplitude (position) or the RMS."
+    report.section("Differences").table(table_of(result.rows, columns, caption, digits=3))
+    for row, comparison in zip(result.rows, result.comparisons, strict=True):
+        section = report.section(sentence(row.name))
+        for figure, caption in comparison_figures(comparison):
+            section.figure(figure, caption)
+    return with_end(report, result.checks, f"low-fidelity --seed {seed}", {"Seed": seed})

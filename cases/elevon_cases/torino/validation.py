@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -20,7 +20,10 @@ from elevon.logs.drive import drive_log
 from elevon.logs.log import Log
 from elevon.plain import WORKING, Plain
 from elevon.progress import Progress, part
+from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
+from elevon.report.figures import new_figure
+from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, Column, table_of, with_end
 from elevon_cases.torino.backlash_estimate import flat_lengths, lost_motion
 from elevon_cases.torino.bench_unit import (
     ACTUATOR,
@@ -32,6 +35,11 @@ from elevon_cases.torino.bench_unit import (
     procedure_of,
     trace,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 START = 10.0
 """What came before is transient and left out, as in the thesis [s]."""
@@ -83,6 +91,19 @@ class ValidationCurves:
     command: Floats
     bench: Mapping[str, Floats]
     model: Mapping[str, Floats]
+
+    def place(self, start: float, span: float) -> slice:
+        """Return where a stretch [s] lies in the curves."""
+        return slice(*np.searchsorted(self.time, [start, start + span]).tolist())
+
+    def part(self, start: float, span: float) -> ValidationCurves:
+        """Return a stretch [s] of the curves."""
+        place = self.place(start, span)
+        bench, model = (
+            {signal: values[place] for signal, values in side.items()}
+            for side in (self.bench, self.model)
+        )
+        return ValidationCurves(self.reading, self.time[place], self.command[place], bench, model)
 
 
 @dataclass(frozen=True)
@@ -257,28 +278,141 @@ def _waves(time: Floats, frequency: float) -> Floats:
     return np.asarray(np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)]))
 
 
-def page_values(result: TorinoValidation) -> dict[str, object]:
-    """Return two periods of each curve, one extreme of the first, and the factor to rpm."""
-    late = [_late(curve, START, 10.0) for curve in result.curves]
-    top = result.curves[0].time[_part(result.curves[0], START, 5.0)]
-    encoder = result.curves[0].bench["encoder_position"][_part(result.curves[0], START, 5.0)]
-    extreme = _late(result.curves[0], float(top[np.argmax(encoder)]) - 0.3, 0.8)
-    return {"late": late, "extreme": extreme, "rpm": 30.0 / np.pi}
+def torino_validation_page(result: TorinoValidation, date: str | None = None) -> Report:
+    """Return the report: errors, and the curves as the works draw them."""
+    report = Report(
+        "Bench against model at three backlashes",
+        "The works draw measured and simulated curves; their signals were not published. Measured "
+        "here means the virtual bench with hidden values. The model was calibrated on other logs, "
+        "at the least backlash, and shares with the bench its equations: what is judged is the "
+        "procedure and what it leaves over, not how good the works' own model is.",
+        date=date,
+    )
+    report.section("Errors").table(
+        table_of(result.rows, _ERRORS, "After 10 s; the last column is the amplitudes' ratio.")
+    ).table(
+        table_of(
+            result.backlashes,
+            _BACKLASHES,
+            "Lost motion of both, mean standstill at the extremes, and the sine fitted to the "
+            "command.",
+        )
+    )
+    late = [curve.part(START, 10.0) for curve in result.curves]
+    first, reading = late[0], f"{late[0].reading:g} mm"
+    period = result.curves[0].part(START, 5.0)
+    top = float(period.time[np.argmax(period.bench["encoder_position"])])
+    extreme = result.curves[0].part(top - 0.3, 0.8)
+    section = report.section("Encoder and motor")
+    section.figure(
+        _stacked_figure(late, "encoder_position", "deg", 6.4, command=True),
+        "Encoder at three backlashes (paper, Figures 9 and 11; thesis, 76, 83).",
+    )
+    section.figure(
+        _single_figure(extreme, "encoder_position", "Encoder [deg]", 2.6, "lower right"),
+        f"The standstill at an extreme, {reading} (thesis, Figure 77).",
+    )
+    section.figure(
+        _single_figure(first, "motor_position", "Motor [deg]", 2.4, "upper right"),
+        f"Motor at {reading} (thesis, Figure 78).",
+    )
+    section.figure(
+        _fitted_figure([result.curves[0], result.curves[-1]]),
+        "Encoder and fitted command, least and most backlash (Figure 79).",
+    )
+    section = report.section("Errors over time")
+    for signal, number in (("encoder_position", 80), ("motor_position", 81)):
+        name = signal.replace("_", " ")
+        caption = f"Error of the {name} at three backlashes (Figure {number})."
+        section.figure(_errors_figure(late, signal), caption)
+    report.section("Speed").figure(
+        _stacked_figure(late, "motor_speed", "rpm", 6.0),
+        "Motor speed at three backlashes (paper, Figure 10; thesis, 82).",
+    )
+    made = {"Parameter hash": result.parameter_hash}
+    return with_end(report, result.checks, f"torino-validation --seed {result.seed}", made)
 
 
-def _part(curve: ValidationCurves, start: float, span: float) -> slice:
-    return slice(*np.searchsorted(curve.time, [start, start + span]).tolist())
+_ERRORS: tuple[Column, ...] = (
+    ("Micrometer [mm]", "micrometer_mm"),
+    ("Signal", lambda row: row.signal.replace("_", " ")),
+    ("RMS error", "rms", ".3g"),
+    ("Unit", "unit"),
+    ("% of range", "percent_of_range", ".3g"),
+    ("Bench over model", "ratio", ".4f"),
+)
+_BACKLASHES = (
+    ("Micrometer [mm]", "micrometer_mm"),
+    ("Printed [deg]", "printed_deg"),
+    ("Bench [deg]", "bench_lost_deg"),
+    ("Model [deg]", "model_lost_deg"),
+    ("Bench [s]", "bench_flat_s"),
+    ("Model [s]", "model_flat_s"),
+    ("Amplitude [deg]", "fitted_amplitude_deg"),
+    ("Frequency [Hz]", "fitted_frequency_hz"),
+)
+_SHOWN = {"deg": 180.0 / np.pi, "rpm": 30.0 / np.pi}
 
 
-def _late(curve: ValidationCurves, start: float, span: float) -> dict[str, object]:
-    """Return a part of a curve, with the sine nearest to its command."""
-    part = _part(curve, start, span)
-    sides = {
-        name: {signal: values[part] for signal, values in side.items()}
-        for name, side in (("bench", curve.bench), ("model", curve.model))
-    }
-    return {"reading": curve.reading, "time": curve.time[part], "command": curve.command[part],
-            "fitted": _sine(curve)[part], **sides}  # fmt: skip
+def _draw_both(axes: Axes, curve: ValidationCurves, signal: str, unit: str) -> None:
+    """Draw bench and model."""
+    for side, colour, width, label in (
+        (curve.bench, GREY, 2.6, "bench"),
+        (curve.model, ORANGE, 1, "model"),
+    ):
+        axes.plot(curve.time, _SHOWN[unit] * side[signal], color=colour, lw=width, label=label)
+
+
+def _stacked_figure(
+    curves: list[ValidationCurves], signal: str, unit: str, height: float, *, command: bool = False
+) -> Figure:
+    """Draw bench and model, a backlash a row."""
+    with new_figure(len(curves), 1, height=height, sharex=True) as (figure, rows):
+        for axes, curve in zip(rows, curves, strict=True):
+            if command:
+                values = np.degrees(curve.command)
+                axes.plot(curve.time, values, color=GREEN, lw=0.8, label="command")
+            _draw_both(axes, curve, signal, unit)
+            axes.set_ylabel(f"{curve.reading:g} mm [{unit}]")
+        rows[0].legend(loc="upper right", ncols=3 if command else 2)
+        rows[-1].set_xlabel("Time [s]")
+    return figure
+
+
+def _single_figure(
+    curve: ValidationCurves, signal: str, label: str, height: float, place: str
+) -> Figure:
+    with new_figure(height=height) as (figure, axes):
+        _draw_both(axes, curve, signal, "deg")
+        axes.set(xlabel="Time [s]", ylabel=label)
+        axes.legend(loc=place, ncols=2)
+    return figure
+
+
+def _fitted_figure(curves: list[ValidationCurves]) -> Figure:
+    with new_figure(len(curves), 1, height=4.0, sharex=True) as (figure, rows):
+        for axes, curve in zip(rows, curves, strict=True):
+            place, fitted = curve.place(START, 10.0), _sine(curve)
+            for values, colour, width, label in (
+                (curve.bench["encoder_position"], GREEN, None, "encoder"),
+                (fitted, GREY, 0.9, "sine fitted to the command"),
+            ):
+                angle = np.degrees(values[place])
+                axes.plot(curve.time[place], angle, color=colour, lw=width, label=label)
+            axes.set_ylabel(f"{curve.reading:g} mm [deg]")
+        rows[0].legend(loc="upper right", ncols=2)
+        rows[-1].set_xlabel("Time [s]")
+    return figure
+
+
+def _errors_figure(curves: list[ValidationCurves], signal: str) -> Figure:
+    with new_figure(height=2.6) as (figure, axes):
+        for curve, colour in zip(curves, (BLUE, ORANGE, GREEN), strict=True):
+            error = np.degrees(curve.model[signal] - curve.bench[signal])
+            axes.plot(curve.time, error, color=colour, lw=0.9, label=f"{curve.reading:g} mm")
+        axes.set(xlabel="Time [s]", ylabel="Model - bench [deg]")
+        axes.legend(loc="upper right", ncols=3)
+    return figure
 
 
 def _sine(curve: ValidationCurves) -> Floats:
