@@ -49,12 +49,12 @@ def table_of(
     )
 
 
-def _cell(row: object, shown: str | Callable[..., object]) -> object:
-    if callable(shown):
-        return shown(row)
+def _cell(row: object, column: str | Callable[..., object]) -> object:
+    if callable(column):
+        return column(row)
     if isinstance(row, Mapping):
-        return row[shown]
-    return reduce(getattr, shown.split("."), row)
+        return row[column]
+    return reduce(getattr, column.split("."), row)
 
 
 def with_end(

@@ -231,12 +231,12 @@ def _add_effects(report: Report, effects: Mapping[str, Sequence[FactorEffect]]) 
     )
     for name, rows in effects.items():
         title, unit, decimals = MEASURES[name]
-        shown = f"+.{decimals}f"
+        digits = f"+.{decimals}f"
         columns: tuple[Column, ...] = (
             ("Factor or pair", "term"),
-            (f"Effect [{unit}]", "effect", shown),
-            ("from", "low", shown),
-            ("to", "high", shown),
+            (f"Effect [{unit}]", "effect", digits),
+            ("from", "low", digits),
+            ("to", "high", digits),
             ("p", lambda row: "< 1e-4" if row.p < 1e-4 else f"{row.p:.2g}"),
         )
         section.table(table_of(rows, columns, title))

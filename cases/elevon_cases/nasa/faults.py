@@ -323,8 +323,8 @@ def _panels_figure(item: FaultFigure) -> Figure:
         position.set(ylabel="Position [mm]")
         load.plot(item.time[::10], item.load[::10], color=BLUE)
         load.set(ylabel="Load [N]")
-        for panel, shown in ((current, slice(None, None, 10)), (close, zoom)):
-            time, healthy, faulty = item.time[shown], item.healthy[shown], item.faulty[shown]
+        for panel, samples in ((current, slice(None, None, 10)), (close, zoom)):
+            time, healthy, faulty = item.time[samples], item.healthy[samples], item.faulty[samples]
             panel.plot(time, healthy, color=GREY, lw=1.5, label="baseline")
             panel.plot(time, faulty, color=ORANGE, lw=0.8, label="fault")
             panel.set(xlabel="Time [s]", ylabel="Phase 1 [A]")

@@ -207,14 +207,14 @@ def flight_page(result: FlightResult, date: str | None = None) -> Report:
         f"factor, vibration and the fault ({FAULT}).",
         date=date,
     )
-    shown = (
+    signals = (
         ("command", 1e3, "Command [mm]"),
         ("load", 1.0, "Force [N]"),
         ("torque_current", 1.0, "Current [A]"),
         ("surface_temperature", 1.0, "Housing [K]"),
     )
     with new_figure(4, 1, height=7.0, sharex=True) as (figure, panels):
-        for axes, (role, scale, label) in zip(panels, shown, strict=True):
+        for axes, (role, scale, label) in zip(panels, signals, strict=True):
             for item, colour in zip(result.logs, (BLUE, ORANGE), strict=True):
                 channel = item.log.role(role)
                 time, values = channel.time[::5], scale * channel.values[::5]

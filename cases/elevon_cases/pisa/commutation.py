@@ -256,8 +256,8 @@ def _turn_figure(run: Recording, poles: float) -> Figure:
         for number, (leg, colour) in enumerate(_LEGS):
             hall, current = (run[f"{name}_{leg}"].values[inside][order]
                              for name in ("hall", "current"))  # fmt: skip
-            shown = 0.8 * hall - number
-            sensors.plot(degrees[order], shown, color=colour, drawstyle="steps-post")
+            level = 0.8 * hall - number
+            sensors.plot(degrees[order], level, color=colour, drawstyle="steps-post")
             currents.plot(degrees[order], current, color=colour, label=leg)
         sensors.set_yticks([0.4, -0.6, -1.6], ["Hall a", "Hall b", "Hall c"])
         currents.set(xlabel="Electrical angle [deg]", ylabel="Current [A]", xlim=(0.0, 360.0))
@@ -270,13 +270,13 @@ def _carrier_figure(run: Recording, span: float) -> Figure:
     """Draw voltages and demand over some carrier periods."""
     time = run.clock().time
     inside = (time > WINDOW[0]) & (time < WINDOW[0] + span)
-    shown = 1e3 * (time[inside] - WINDOW[0])
+    millis = 1e3 * (time[inside] - WINDOW[0])
     with new_figure(height=3.2) as (figure, axes):
         for leg, colour in _LEGS:
             voltage = run[f"voltage_{leg}"].values[inside]
-            axes.plot(shown, voltage, color=colour, lw=1.0, label=f"phase {leg}")
+            axes.plot(millis, voltage, color=colour, lw=1.0, label=f"phase {leg}")
         demand = run["duty"].values[inside] * run["supply_voltage"].values[inside]
-        axes.plot(shown, demand, "k--", lw=1.0, label="demand")
+        axes.plot(millis, demand, "k--", lw=1.0, label="demand")
         axes.set(xlabel="Time [ms]", ylabel="Voltage [V]")
         axes.legend(loc="upper right", ncols=4)
     return figure

@@ -464,14 +464,14 @@ def _preload_figure(result: FrictionResult) -> Figure:
 
 def _history_figure(both: Sequence[FrictionTrace]) -> Figure:
     """Draw friction, position and speeds of one test in both directions."""
-    shown = (
+    signals = (
         ("friction_n", "Friction [N]"),
         ("position_mm", "Ram [mm]"),
         ("ram_mm_s", "Ram [mm/s]"),
         ("motor_rad_s", "Motor [rad/s]"),
     )
     with new_figure(4, 1, height=6.2, sharex=True) as (figure, panels):
-        for axes, (name, label) in zip(panels, shown, strict=True):
+        for axes, (name, label) in zip(panels, signals, strict=True):
             width = {"lw": 0.8} if name == "friction_n" else {}
             for trace, (way, colour, _) in zip(both, _WAYS, strict=True):
                 thin = slice(10, None, max(1, trace.time.size // 1500))

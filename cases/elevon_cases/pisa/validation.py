@@ -417,14 +417,14 @@ def validation_page(result: ValidationResult, date: str | None = None) -> Report
         ("Tuned [N]", lambda item: item[1][1], ".0f"),
     )
     report.section("What was tuned").table(table_of(result.friction.items(), tuned))
-    shown = (
+    signals = (
         ("output_position", "Position [mm]", 1e3),
         ("motor_speed", "Motor speed [rad/s]", 1.0),
         ("torque_current", "Current [A]", 1.0),
     )
     for trace in result.traces:
         with new_figure(3, 1, height=5.4, sharex=True) as (figure, panels):
-            for axes, (signal, label, scale) in zip(panels, shown, strict=True):
+            for axes, (signal, label, scale) in zip(panels, signals, strict=True):
                 axes.plot(trace.time, scale * trace.measured[signal], color=GREY, lw=3.0)
                 axes.plot(trace.time, scale * trace.simulated[signal], color=ORANGE, lw=1)
                 axes.set_ylabel(label)

@@ -414,7 +414,7 @@ def _springs_figure() -> Figure:
 
     task = SpringTask()
     wires = [float(wire) for wire in STANDARD_WIRES if 2e-3 <= wire <= 4e-3]
-    shown = 1e3 * np.array(wires)
+    diameters = 1e3 * np.array(wires)
     largest = 1e3 * np.array([task.largest_coil(wire) for wire in wires])
     coils = [design_spring(task, wire=wire).coils for wire in wires]
     with new_figure(1, 2, height=2.8) as (figure, both):
@@ -422,7 +422,7 @@ def _springs_figure() -> Figure:
             (both[0], largest, 34.0, "Largest mean diameter [mm]"),
             (both[1], coils, 342.0, "Coils at 34 mm"),
         ):
-            axes.plot(shown, values, "o-", ms=3, color=BLUE)
+            axes.plot(diameters, values, "o-", ms=3, color=BLUE)
             axes.plot([3.0], [printed], "s", color=ORANGE)
             axes.set(xlabel="Wire [mm]", ylabel=name)
     return figure

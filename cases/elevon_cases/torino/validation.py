@@ -351,7 +351,7 @@ _BACKLASHES = (
     ("Amplitude [deg]", "fitted_amplitude_deg"),
     ("Frequency [Hz]", "fitted_frequency_hz"),
 )
-_SHOWN = {"deg": 180.0 / np.pi, "rpm": 30.0 / np.pi}
+_FACTORS = {"deg": 180.0 / np.pi, "rpm": 30.0 / np.pi}
 
 
 def _draw_both(axes: Axes, curve: ValidationCurves, signal: str, unit: str) -> None:
@@ -360,7 +360,7 @@ def _draw_both(axes: Axes, curve: ValidationCurves, signal: str, unit: str) -> N
         (curve.bench, GREY, 2.6, "bench"),
         (curve.model, ORANGE, 1, "model"),
     ):
-        axes.plot(curve.time, _SHOWN[unit] * side[signal], color=colour, lw=width, label=label)
+        axes.plot(curve.time, _FACTORS[unit] * side[signal], color=colour, lw=width, label=label)
 
 
 def _stacked_figure(
