@@ -3,9 +3,10 @@
     python tools/check_wheel.py dist              the newest wheel of a folder
     python tools/check_wheel.py A.whl --from-sdist    made of the source distribution: no FMU binary
 
-Where the wheel of the published cases lies beside it, both together are used, too. Run by
-`make wheel` and `make sdist`. Prints the seconds from nothing to the first picture. Needs a
-package index, as every `pip install` does.
+With extras README and the tutorial are run as a newcomer does (`tools/newcomer.py`). Where the
+wheel of the published cases lies beside it, both together are used, too. Run by `make wheel` and
+`make sdist`. Prints the seconds from nothing to the first picture. Needs a package index, as every
+`pip install` does.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ import venv
 import zipfile
 from pathlib import Path
 
+import newcomer
+
 MOST_MB = 130
 # What is part of every environment and not of the installation.
 NOT_OURS = ("pip", "setuptools", "wheel", "_distutils_hack", "pkg_resources")
@@ -28,6 +31,7 @@ NOT_OURS = ("pip", "setuptools", "wheel", "_distutils_hack", "pkg_resources")
 PASSED_ON = ("HOME", "SYSTEMROOT", "TEMP", "TMP", "LANG", "SSL_CERT_FILE")
 INSTALL = ("-m", "pip", "install", "--quiet", "--only-binary", ":all:")
 TURN = ("simulate", "torino-rotary", "--duration", "0.1")
+PAGES = ("README.md", "docs/start/tutorial.md")
 SESSION = """
 import elevon
 session = elevon.Session("nasa-ballscrew")
@@ -117,6 +121,10 @@ def everything(place: Place, wheel: Path) -> None:
     place.run("elevon", "bench", "run", "chirp", *unit, "--fidelity", "low", "--out", "logs")
     place.run("elevon", "diagnose", "logs/chirp.csv", *unit, "--baseline", "logs/chirp.csv")
     print("Parquet, pictures, diagnosis: with all extras, without a compiler")
+    os.environ.pop("PYTHONPATH", None)  # the source tree must not stand in for what was installed
+    wrong = sum(newcomer.run_page(newcomer.ROOT / page, place.scripts) for page in PAGES)
+    if wrong:
+        raise SystemExit(f"{wrong} blocks of {' and '.join(PAGES)} fail or print something else")
 
 
 def published(place: Place, wheel: Path, cases: Path) -> None:
@@ -126,6 +134,7 @@ def published(place: Place, wheel: Path, cases: Path) -> None:
         raise SystemExit(f"{wheel.name} has published cases: {', '.join(foreign)}")
     if not {"elevon_cases/cases.toml", "elevon_cases/catalogue/cases.toml"} <= _names(cases):
         raise SystemExit(f"{cases.name}: its tables are missing")
+    # Of an environment with the product alone.
     output = place.run("elevon", "reproduce", "torino-compliance", "--json", fails=True)
     if "pip install elevon-cases" not in output:
         raise SystemExit(f"a command of another package does not name it: {output}")

@@ -105,12 +105,12 @@ def _block(form: str, name: str) -> str:
     checks = [dict(check) for check in run["checks"]]  # type: ignore[attr-defined]
     missed = [check for check in checks if not check["passed"]]
     text = f"`{run['command']}`, {run['date']}, commit `{run['commit']}`: "
-    text += f"{len(checks) - len(missed)} of {len(checks)} checks pass.\n"
+    text += f"{_counts(checks)} pass.\n"
     if form == "checks":
-        rows = [f"| {c['name']} | {_value(c)} | {_limit(c)} | {_yes(c)} |" for c in checks]
-        return "\n".join(
-            [text, "| check | value | limit | passed |", "|---|---|---|---|", *rows, ""]
-        )
+        rows = [f"| {c['name']} | {_kind(c)} | {_value(c)} | {_limit(c)} | {_yes(c)} |"
+                for c in checks]  # fmt: skip
+        head = ["| check | kind | value | limit | passed |", "|---|---|---|---|---|"]
+        return "\n".join([text, *head, *rows, ""])
     lines = [f"* not met: {c['name']}: {_value(c)} ({_limit(c)})" for c in missed]
     return "\n".join([text, *lines, ""]) if lines else text
 
@@ -121,6 +121,18 @@ def _judged(name: str) -> str:
     ]
     row = [row for row in csv.DictReader(lines) if name in row["command"].split()][-1]
     return f"`{row['command']}`, {row['date']}, commit `{row['commit']}`, run once.\n"
+
+
+def _kind(check: dict[str, object]) -> str:
+    """What a check is held against; a study's checks do not say."""
+    return str(check.get("kind", "check")).replace("_", " ")
+
+
+def _counts(checks: list[dict[str, object]]) -> str:
+    """Return how many pass of each kind: kinds are never added."""
+    kinds = dict.fromkeys(map(_kind, checks))
+    found = {kind: [check["passed"] for check in checks if _kind(check) == kind] for kind in kinds}
+    return ", ".join(f"{kind} {sum(map(bool, p))} of {len(p)}" for kind, p in found.items())
 
 
 def _value(check: dict[str, object]) -> str:

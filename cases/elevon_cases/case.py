@@ -191,11 +191,19 @@ def compute(case: PublishedCase, options: Options, progress: Any) -> tuple[Any, 
         case.prepare(options)
     result = case.call(case.work, **options, progress=progress)
     values: Values = result.to_dict()
+    if case.published is not None:
+        values["checks"] = [_with_kind(check, case.published) for check in values["checks"]]
     out: Path | None = options.get("out")
     if out is not None and case.page:
         report = case.report(result, options)
         _write(out, report, values["rows"], options["force"])
     return result, values
+
+
+def _with_kind(check: Values, record: Published) -> Values:
+    """Return a check with its kind and what it is held against."""
+    judged = record.judgement(check["name"])
+    return {**check, "kind": judged.kind, "basis": judged.basis}
 
 
 def check_file(path: Path | None, options: Options) -> None:
@@ -240,15 +248,19 @@ def _cell(value: object) -> str:
 
 
 def _print_checks(values: Values) -> None:
-    passed = sum(check["passed"] for check in values["checks"])
-    answer(f"{values['status']}: {passed} of {len(values['checks'])} checks")
+    kinds: dict[str, list[bool]] = {}
+    for check in values["checks"]:
+        kinds.setdefault(check.get("kind", "checks"), []).append(check["passed"])
+    counts = "; ".join(f"{kind} {sum(passed)} of {len(passed)}" for kind, passed in kinds.items())
+    answer(f"{values['status']}: {counts}")
     rows = [
         [
             check["name"],
+            check.get("kind", ""),
             f"{check['value']:.5g}",
             f"{'>=' if check['at_least'] else '<='} {check['limit']:.5g} {check['unit']}",
             "pass" if check["passed"] else "FAIL",
         ]
         for check in values["checks"]
     ]
-    print_table(["check", "value", "limit", ""], rows)
+    print_table(["check", "kind", "value", "limit", ""], rows)

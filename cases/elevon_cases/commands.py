@@ -124,7 +124,7 @@ def _reproduce(
     force: bool,
     as_json: bool,
 ) -> int:
-    from elevon_cases.everything import reproduce_everything
+    from elevon_cases.everything import counted, reproduce_everything
 
     cases = case_runs(only, data, seed, date)
     key = f"reproduce --all only {sorted(only)} seed {seed} data {data} date {date}"
@@ -135,13 +135,14 @@ def _reproduce(
     say(f"index: {out / 'index.html'}")
     if as_json:
         print_json(result.to_dict())
-        return 0 if result.status == "pass" else 1
-    counts = ", ".join(f"{result.count(name)} {name}" for name in ("pass", "fail", "not run"))
-    answer(f"{result.status}: {counts}, of {len(cases)} cases")
-    rows = [[row.case, row.check, row.verdict, row.reason] for row in result.rows
+        return int(result.status == "fail")
+    counts = "; ".join(f"{kind} {counted(found)}" for kind, found in result.counts().items())
+    answer(f"{result.status}: {counts}; of {len(cases)} cases")
+    rows = [[row.case, row.check, row.kind, row.verdict, row.reason] for row in result.rows
             if row.verdict != "pass"]  # fmt: skip
-    print_table(["case", "check", "verdict", "reason"], rows, title="rows that do not pass")
-    return 0 if result.status == "pass" else 1
+    headings = ["case", "check", "kind", "verdict", "reason"]
+    print_table(headings, rows, title="rows that do not pass")
+    return int(result.status == "fail")
 
 
 def case_runs(
@@ -163,6 +164,8 @@ def case_runs(
         given = {"data": data} if record.needs else {}
         options = case.defaults() | dict(record.options) | given | {"seed": seed, "date": date}
         missing = record.needs and given.get(record.needs.removeprefix("--")) is None
+        if missing and list(only) == [case.name]:
+            raise UsageError(f"{case.name} needs its data: give {record.needs}")
         absent = f"data absent: give {record.needs}" if missing else ""
         runs.append(CaseRun(record, partial(_work, case, options), absent))
     return runs

@@ -20,10 +20,19 @@ from elevon.report import Report, ReportTable, provenance
 from elevon.report.checks import Check
 from elevon.results import finite
 from elevon.worklog import Item, finished, sweep
-from elevon_cases.catalogue import Judgement, Published, PublishedWork, works
+from elevon_cases.catalogue import (
+    KINDS,
+    SELF_CONSISTENCY,
+    Judgement,
+    Published,
+    PublishedWork,
+    works,
+)
 
-PASS, FAIL, NOT_RUN = "pass", "fail", "not run"
+PASS, FAIL, NOT_RUN = "pass", "fail", "not_run"
 _INDEX = ("index.html", "index.json")
+_SAID = ("passed", "kind", "basis")
+"""What the JSON form of a check says beside the check itself."""
 UNEXPLAINED = "no reason is known"
 
 
@@ -37,6 +46,8 @@ class IndexRow:
         The work; its table or figure.
     case, check : str
         The command; the check's name.
+    kind, basis : str
+        What it is held against, as `Judgement` has it; empty where the catalogue has no such check.
     ours : float or None
         The number found; None where the case was not run.
     unit : str
@@ -48,7 +59,7 @@ class IndexRow:
     limit : str
         What the check's value is held to.
     verdict : str
-        ``pass``, ``fail`` or ``not run``.
+        ``pass``, ``fail`` or ``not_run``.
     reason : str
         Why, where it is not ``pass``.
     definition : str
@@ -61,6 +72,8 @@ class IndexRow:
     item: str
     case: str
     check: str
+    kind: str
+    basis: str
     ours: float | None
     unit: str
     theirs: str
@@ -102,21 +115,27 @@ class EveryCase:
 
     @property
     def status(self) -> str:
-        """``fail`` where a row is, else ``pass``: what was not run is no failure."""
-        return FAIL if any(row.verdict == FAIL for row in self.rows) else PASS
+        """``fail`` where a row is, else ``not_run`` where one is: neither is a pass."""
+        found = {row.verdict for row in self.rows}
+        return next((verdict for verdict in (FAIL, NOT_RUN) if verdict in found), PASS)
 
-    def count(self, verdict: str) -> int:
-        """Return how many rows have a verdict."""
-        return sum(row.verdict == verdict for row in self.rows)
+    def counts(self) -> dict[str, dict[str, int]]:
+        """Return how many rows of each kind have each verdict; kinds are never added."""
+        found = Counter((row.kind, row.verdict) for row in self.rows)
+        return {
+            kind: {verdict: found[kind, verdict] for verdict in (PASS, FAIL, NOT_RUN)}
+            for kind in KINDS
+            if any(row.kind == kind for row in self.rows)
+        }
 
     def to_dict(self) -> dict[str, object]:
-        """Return the JSON object: status, checks, rows, how many rows of each verdict."""
+        """Return the JSON object: status, checks, rows, counts by kind and verdict."""
         import elevon
 
         return {
             "status": self.status,
             "checks": [check.to_dict() for check in self.checks],
-            "summary": {verdict: self.count(verdict) for verdict in (PASS, FAIL, NOT_RUN)},
+            "counts": self.counts(),
             "rows": [asdict(row) for row in self.rows],
             "cpu_s": dict(self.seconds),
             "seed": self.seed,
@@ -241,7 +260,7 @@ def _run(
 
 def _check(entry: Mapping[str, Any]) -> Check:
     """Return a check as it was kept; a value that was not finite is null there."""
-    known = {name: value for name, value in entry.items() if name != "passed"}
+    known = {name: value for name, value in entry.items() if name not in _SAID}
     value = entry["value"]
     return Check(**known | {"value": float("nan") if value is None else value})
 
@@ -250,8 +269,7 @@ def rows_of(record: Published, checks: Sequence[Check], link: str = "") -> list[
     """Return the rows of a case that ran: its checks, and what it was to check and did not."""
     rows = []
     for check in checks:
-        judged = next((item for item in record.checks if item.judges(check.name)), None)
-        rows.append(_row(record, check, judged or Judgement(check.name, " ", "", ""), link))
+        rows.append(_row(record, check, record.judgement(check.name), link))
     for judged in record.checks:
         if not any(judged.judges(check.name) for check in checks):
             rows.append(_without(record, judged, NOT_RUN, "the case made no such check", link))
@@ -274,6 +292,8 @@ def _row(record: Published, check: Check, judged: Judgement, link: str) -> Index
         item=item,
         case=record.name,
         check=check.name,
+        kind=judged.kind,
+        basis=judged.basis,
         ours=check.value if check.ours is None else check.ours,
         unit=(check.unit if check.ours_unit is None else check.ours_unit).removesuffix("1"),
         theirs=judged.theirs,
@@ -290,14 +310,16 @@ def _without(
     record: Published, judged: Judgement, verdict: str, reason: str, link: str
 ) -> IndexRow:
     paper, _, item = judged.item.partition(" ")
-    return IndexRow(paper, item, record.name, judged.check, None, "", judged.theirs, None, "",
-                    verdict, reason, judged.definition, link)  # fmt: skip
+    return IndexRow(paper, item, record.name, judged.check, judged.kind, judged.basis, None, "",
+                    judged.theirs, None, "", verdict, reason, judged.definition, link)  # fmt: skip
 
 
 _COLUMNS = (
     "item",
     "case",
     "check",
+    "kind",
+    "basis",
     "ours",
     "unit",
     "theirs",
@@ -310,22 +332,33 @@ _COLUMNS = (
 
 def index_page(result: EveryCase, date: str | None) -> Report:
     """Return the page: rows by work, then every table and figure with what makes it."""
-    counts = {name: result.count(name) for name in ("pass", "fail", "not run")}
-    lead = ", ".join(f"{number} {name}" for name, number in counts.items())
-    report = Report("Published results, recomputed", f"Checks: {lead}.", date=date)
-    for name, number in counts.items():
-        report.fact(name, str(number))
-    _failed(report, [row for row in result.rows if row.verdict == "fail"])
-    _not_run(report, [row for row in result.rows if row.verdict == "not run"])
-    for work in works():
-        rows = [row for row in result.rows if row.paper == work.name]
-        if rows:
-            report.section(work.title).table(_table(rows))
+    report = Report(
+        "Published results, recomputed",
+        "A check is held against what a work prints, a closed form, another program, a real log, "
+        "or only against ourselves; these are counted apart.",
+        date=date,
+    )
+    for kind, counts in result.counts().items():
+        report.fact(kind.replace("_", " "), counted(counts), KINDS[kind])
+    _failed(report, [row for row in result.rows if row.verdict == FAIL])
+    _not_run(report, [row for row in result.rows if row.verdict == NOT_RUN])
+    for own in (False, True):
+        for work in works():
+            mine = [row for row in result.rows if row.paper == work.name]
+            rows = [row for row in mine if own == (row.kind == SELF_CONSISTENCY)]
+            if rows:
+                title = f"Self-consistency: {work.title}" if own else work.title
+                report.section(title).table(_table(rows))
     for work in works():
         report.section(f"Tables and figures: {work.title}").table(_items(work))
     command = f"elevon reproduce --all --seed {result.seed} --out DIR"
     report.provenance(provenance(command, Seed=result.seed))
     return report
+
+
+def counted(counts: Mapping[str, int]) -> str:
+    """Return counts by verdict in words, those that are there."""
+    return ", ".join(f"{number} {verdict}" for verdict, number in counts.items() if number)
 
 
 def _failed(report: Report, rows: list[IndexRow]) -> None:
@@ -384,7 +417,11 @@ def _cell(row: IndexRow, name: str) -> object:
 
 def _items(work: PublishedWork) -> ReportTable:
     rows = [[i.name, i.text, "; ".join(i.commands), i.why] for i in work.items]
-    made = sum(bool(item.commands) for item in work.items)
-    folded = f"{made} of {len(rows)} are made by a command"
+    made = [item for item in work.items if item.commands]
+    compared = sum(item.compared for item in made)
+    folded = (
+        f"{compared} of {len(rows)} made and compared, {len(made) - compared} made and not "
+        f"compared, {len(rows) - len(made)} not made"
+    )
     return ReportTable(("item", "what it shows", "command", "why none, or what differs"), rows,
                        folded=folded)  # fmt: skip

@@ -7,6 +7,7 @@ from functools import reduce
 
 from elevon.report import Check, Report, ReportTable, provenance
 from elevon.report.figures import COLOURS
+from elevon_cases.catalogue import KINDS, published
 
 BLUE, ORANGE, GREEN, RED, VIOLET, GREY = (
     COLOURS[name] for name in ("blue", "orange", "green", "red", "violet", "grey")
@@ -76,7 +77,11 @@ def with_end(
     made : mapping, optional
         What else is stated, such as the seed; empty texts are left out.
     """
-    report.section("Checks").checks(checks)
+    section, record = report.section("Checks"), published()[command.split(maxsplit=1)[0]]
+    for kind, about in KINDS.items():
+        of_kind = [check for check in checks if record.judgement(check.name).kind == kind]
+        if of_kind:
+            section.heading(f"Held against {about}").checks(of_kind)
     known = {name: value for name, value in (made or {}).items() if value != ""}
     report.provenance(provenance(f"elevon reproduce {command} --out DIR", **known))
     return report

@@ -59,9 +59,10 @@ def fmeca(healthy="healthy", **wrong):
     """Return the checks of a table whose lines are all named, but for one."""
     from elevon_cases.torino.fmeca import LINES, NAMED, RATES, FmecaResult, FmecaRow
 
-    rows = [FmecaRow(part, mode, RATES[part], fault, 20.0, "motor_speed", NAMED, "")
+    rows = [FmecaRow(part, mode, RATES[part], fault, 200.0, "motor_speed", NAMED, "")
             for part, mode, fault in LINES]  # fmt: skip
-    return FmecaResult([replace(rows[0], **wrong), *rows[1:]], healthy, 0, "").checks
+    rows[0] = replace(rows[0], **wrong)
+    return FmecaResult(rows, healthy, [2.0, 4.0], 0, "").checks
 
 
 # --- torino-control ------------------------------------------------------------------------------
@@ -154,7 +155,9 @@ BENCH_PLANTED = {
     ("torino-gear", "loaded sine: planets less one elastic backlash, RMS"): partial(gear, rms=0.01),
     ("torino-gear", "loaded sine: wind-up that one backlash leaves out"):
         partial(gear, loaded_deg=0.3656),
-    ("torino-fmeca", "least change of a line"): partial(fmeca, change_percent=0.1),
+    ("torino-fmeca", "least deviation of a line over the largest of a healthy log"): partial(
+        fmeca, deviations=5.0
+    ),
     ("torino-fmeca", "faults called healthy"): partial(fmeca, seen="called healthy"),
     ("torino-fmeca", "faults named as another"): partial(fmeca, seen="another is named"),
     ("torino-fmeca", "faults isolated"): partial(fmeca, seen="unknown fault"),

@@ -64,7 +64,12 @@ def run_of(record, checks, calls=None):
     return CaseRun(record, work)
 
 
-RECORD = Published("one", {}, (Judgement("a *", "nasa Figure 9", "0.84 K", "error"),))
+SOURCE = {"kind": "source", "basis": "nasa Figure 9"}
+RECORD = Published(
+    "one",
+    {},
+    (Judgement("a *", item="nasa Figure 9", theirs="0.84 K", definition="error", **SOURCE),),
+)
 
 
 def test_a_row_has_both_numbers_its_verdict_and_why():
@@ -82,7 +87,7 @@ def test_our_number_has_its_own_unit():
 
 
 def test_a_check_that_was_not_made_is_not_run():
-    assert [row.verdict for row in rows_of(RECORD, [])] == ["not run"]
+    assert [row.verdict for row in rows_of(RECORD, [])] == ["not_run"]
 
 
 def test_a_case_that_raises_fails_and_the_others_go_on(tmp_path):
@@ -100,15 +105,51 @@ def test_what_has_no_data_is_not_run_and_no_failure(tmp_path):
     good = run_of(Published("two", {}, RECORD.checks), [Check("a b", 0.1, 0.84, "K")])
     absent = CaseRun(RECORD, good.work, "data absent: give --data")
     result = reproduce_everything([absent, good], tmp_path, seed=0, key="k")
-    assert [row.verdict for row in result.rows] == ["not run", "pass"]
-    assert result.status == "pass"
+    assert [row.verdict for row in result.rows] == ["not_run", "pass"]
+    assert result.status == "not_run"  # neither a failure nor a pass
+    counts = {"source": {"pass": 1, "fail": 0, "not_run": 1}}
+    assert result.counts() == counts
+    assert json.loads((tmp_path / "index.json").read_text())["counts"] == counts
+
+
+def test_ourselves_are_neither_counted_with_a_work_nor_beside_its_number(tmp_path):
+    own = Judgement("b", "self_consistency", "nasa Figure 9", "", "ours")
+    record = Published("one", {}, (*RECORD.checks, own))
+    case = run_of(record, [Check("a b", 0.1, 0.3, "K"), Check("b", 0.1, 0.5, "K")])
+    result = reproduce_everything([case], tmp_path, seed=0, key="k")
+    one = {"pass": 1, "fail": 0, "not_run": 0}
+    assert result.counts() == {"source": one, "self_consistency": one}
+    page = (tmp_path / "index.html").read_text()
+    assert page.index("0.84 K") < page.index("<h2>Self-consistency")
+    assert "0.84 K" not in page[page.index("<h2>Self-consistency") :].split("</table>")[0]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"kind": "sourc", "basis": "x"}, "source"),
+        ({"kind": "source"}, "takes a 'basis'"),
+        ({"kind": "self_consistency", "theirs": "7.12 %"}, "neither 'basis' nor 'theirs'"),
+        ({"kind": "self_consistency", "basis": "x"}, "neither 'basis' nor 'theirs'"),
+    ],
+)
+def test_a_check_says_what_it_is_held_against(wrong, message):
+    with pytest.raises(InputError, match=message):
+        Judgement("a", **{"item": "nasa Figure 9", "theirs": "", "definition": "", **wrong})
+
+
+def test_one_case_without_its_data_is_refused(tmp_path, capsys):
+    words = ["reproduce", "--all", "--only", "cranfield", "--out", str(tmp_path)]
+    assert main(words) == 2
+    assert "--data" in capsys.readouterr().err
+    assert main(["reproduce", "cranfield"]) == 2
 
 
 def test_the_page_shows_failures_open_and_a_case_that_was_not_run_once(tmp_path):
     checks = [Check(f"a {n}", n, 0.5, "K") for n in (0.1, 0.2, 0.9)]
     judged = (
-        Judgement("a *", "nasa Figure 9", "", "error"),
-        Judgement("b", "nasa Figure 9", "", ""),
+        Judgement("a *", item="nasa Figure 9", theirs="", definition="error", **SOURCE),
+        Judgement("b", item="nasa Figure 9", theirs="", definition="", **SOURCE),
     )
     absent = CaseRun(Published("two", {}, (*judged, judged[1])), dict, "no data here")
     reproduce_everything([run_of(RECORD, checks), absent], tmp_path, seed=0, key="k")
@@ -137,7 +178,7 @@ def test_it_goes_on_after_an_interruption_and_runs_nothing_twice(tmp_path):
     assert result.rows[0].verdict == "fail"  # the value that is no number stayed none
     index = json.loads((tmp_path / "index.json").read_text())
     assert [row["link"] for row in index["rows"]] == ["one/report.html", "two/report.html"]
-    assert index["summary"] == {"pass": 0, "fail": 1, "not run": 1}
+    assert index["counts"] == {"source": {"pass": 0, "fail": 1, "not_run": 1}}
     assert 'href="one/report.html"' in (tmp_path / "index.html").read_text()
 
 

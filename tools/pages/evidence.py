@@ -43,7 +43,7 @@ def cases(paths: list[Path]) -> str:
             f"## {path.stem}\n\n`{run['command']}`, {run['date']}, commit `{run['commit']}`.\n\n"
         )
         rows = [cells(check) for check in run["checks"]]
-        text += table(["check", "value", "limit", "the work's own", "passed"], rows) + "\n"
+        text += table(["check", "kind", "value", "limit", "the work's own", "passed"], rows) + "\n"
     return text
 
 
@@ -54,13 +54,17 @@ def items() -> str:
         "that makes it, or why none does. `elevon reproduce --all --out DIR` runs every case.\n\n"
     )
     for work in works():
-        made = sum(bool(item.commands) for item in work.items)
+        made = [item for item in work.items if item.commands]
+        compared = sum(item.compared for item in made)
         rows = [
             [plain(i.name), plain(i.text), ", ".join(map(code, i.commands)), plain(i.why)]
             for i in work.items
         ]
         head = ["item", "what it shows", "command", "why none, or what differs"]
-        text += f"## {plain(work.title)}\n\n{made} of {len(rows)} are made by a command.\n\n"
+        text += (
+            f"## {plain(work.title)}\n\nOf {len(rows)}, {compared} are made by a command and "
+            f"compared with what is printed, {len(made) - compared} are made and not compared.\n\n"
+        )
         text += f"{table(head, rows)}\n{sections(work)}"
     return text
 
@@ -84,4 +88,6 @@ def cells(check: dict[str, object]) -> list[str]:
     way = "at least" if check["at_least"] else "at most"
     passed = "yes" if check["passed"] else "no"
     name = plain(check["name"])
-    return [name, f"{check['value']:.5g}{unit}", f"{way} {check['limit']:.5g}", printed, passed]
+    kind = str(check.get("kind", "")).replace("_", " ")
+    value, limit = f"{check['value']:.5g}{unit}", f"{way} {check['limit']:.5g}"
+    return [name, kind, value, limit, printed, passed]

@@ -13,6 +13,17 @@ from functools import cache
 from typing import Any
 
 from elevon.data import packaged_toml
+from elevon.errors import InputError, unknown
+
+SELF_CONSISTENCY = "self_consistency"
+KINDS: Mapping[str, str] = {
+    "source": "numbers and statements that the works print",
+    "closed_form": "closed forms",
+    "independent": "another program",
+    "real_log": "logs of real machines",
+    SELF_CONSISTENCY: "ourselves: our own truth, or a limit of ours",
+}
+"""What a check is held against; the kinds are never counted together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,10 +34,16 @@ class Judgement:
     ----------
     check : str
         Their name; ``*`` stands for what differs between rows.
+    kind : str
+        One of `KINDS`.
+    basis : str
+        Of a source the place in the work, with the page where its lists state one; the closed form,
+        the program, the data set. Empty of self-consistency.
     item : str
         Work and table or figure, such as ``torino-paper Table 2``.
     theirs : str
-        What is printed, as printed; empty where the work prints no number for it.
+        What is printed, as printed; empty where the work prints no number for it, and of
+        self-consistency: there no number of a work stands beside a verdict.
     definition : str
         What the value is, and where the limit comes from.
     known : str
@@ -34,10 +51,20 @@ class Judgement:
     """
 
     check: str
+    kind: str
     item: str
     theirs: str
     definition: str
     known: str = ""
+    basis: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise unknown("kind of check", self.kind, KINDS, f"check '{self.check}'")
+        own = self.kind == SELF_CONSISTENCY
+        if own == bool(self.basis) or (own and self.theirs):
+            needs = "neither 'basis' nor 'theirs'" if own else "a 'basis'"
+            raise InputError(f"check '{self.check}': kind {self.kind} takes {needs}")
 
     def judges(self, name: str) -> bool:
         """Whether a check of this name is one of them."""
@@ -71,6 +98,11 @@ class Published:
     seconds: float = 5.0
     needs: str = ""
 
+    def judgement(self, name: str) -> Judgement:
+        """Return what a check of this name is held against; ours alone where none is stated."""
+        found = (judged for judged in self.checks if judged.judges(name))
+        return next(found, Judgement(name, SELF_CONSISTENCY, " ", "", ""))
+
 
 @dataclass(frozen=True, slots=True)
 class PrintedItem:
@@ -93,6 +125,15 @@ class PrintedItem:
     cases: tuple[str, ...]
     command: str = ""
     why: str = ""
+
+    @property
+    def compared(self) -> bool:
+        """Whether a check holds something of ours against what is printed or known otherwise."""
+        judged = (check for case in self.cases for check in published()[case].checks)
+        return any(
+            check.kind != SELF_CONSISTENCY and check.item.endswith(f" {self.name}")
+            for check in judged
+        )
 
     @property
     def commands(self) -> tuple[str, ...]:

@@ -6,11 +6,13 @@ virtual bench. Diagnosis is given the actuator file and one healthy log of anoth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from elevon.actuator import Actuator
+from elevon.arrays import Floats
 from elevon.bench.rig import Setup, setups
 from elevon.errors import InputError
 from elevon.logs.log import Log
@@ -21,8 +23,12 @@ from elevon.report.checks import Check, CheckedResult
 from elevon_cases.page import Column, table_of, with_end
 from elevon_cases.torino.bench_unit import ACTUATOR, logs_of
 
-LEAST_CHANGE = 1.0
-"""Percent of a channel's RMS by which a fault must change it. ASSUMED."""
+HEALTHY_LOGS = 8
+"""Of other seeds, which give each channel's mean and standard deviation. ASSUMED: enough for a
+standard deviation within a quarter of the true one in two of three draws."""
+STANDS_OUT = 1.5
+"""Times the largest deviation that a healthy log has from the other ones, which a line must reach:
+of white noise in 10 to 30 statistics a ninth log does in one of a hundred draws."""
 LINK = {"inverter.link_capacitance": "470 uF"}
 """An open connector empties the capacitor of the link; a file without one has nothing to empty.
 ASSUMED: of a drive of this size."""
@@ -53,15 +59,16 @@ HEALTHY, NAMED, ALIKE, REFUSED, UNEXPLAINED, OTHER = (
 class FmecaRow(Plain):
     """One fault of one line.
 
-    ``change_percent``: largest change of a channel's RMS, or of its difference, over its healthy
-    RMS; ``seen``: what diagnosis makes of the log, in one word; ``answer``: in its own.
+    ``deviations``: largest deviation of a channel's mean or RMS from the healthy logs, in their
+    standard deviations; ``seen``: what diagnosis makes of the log, in one word; ``answer``: in its
+    own.
     """
 
     component: str
     mode: str
     rate_per_h: float
     fault: str
-    change_percent: float
+    deviations: float
     channel: str
     seen: str
     answer: str
@@ -73,6 +80,8 @@ class FmecaResult(CheckedResult):
 
     rows: list[FmecaRow]
     healthy: str
+    healthy_deviations: list[float]
+    """Of each healthy log from the other ones, as of a line: what noise alone gives."""
     seed: int
     parameter_hash: str
 
@@ -82,8 +91,9 @@ class FmecaResult(CheckedResult):
         count = {name: sum(row.seen == name for row in self.rows) for name in (HEALTHY, OTHER)}
         named = sum(row.seen in (NAMED, ALIKE) for row in self.rows)
         return [
-            Check("least change of a line", min(row.change_percent for row in self.rows),
-                  LEAST_CHANGE, "%", at_least=True),
+            Check("least deviation of a line over the largest of a healthy log",
+                  min(row.deviations for row in self.rows) / max(self.healthy_deviations),
+                  STANDS_OUT, "1", at_least=True),
             Check("faults called healthy", float(count[HEALTHY]), 0.0, "faults"),
             Check("faults named as another", float(count[OTHER]), 0.0, "faults"),
             Check("faults isolated", float(named), float(len(self.rows)), "faults", at_least=True),
@@ -106,19 +116,25 @@ def reproduce_fmeca(*, seed: int = 0, progress: Progress | None = None) -> Fmeca
     unit = Actuator.load(ACTUATOR).with_values(LINK, source="of a drive of this size")
     ready = [_setup(unit, "", seed + 1), _setup(unit, "", seed)]
     ready += [_setup(unit, fault, seed) for _, _, fault in LINES]
+    ready += [_setup(unit, "", seed + 1 + number) for number in range(1, HEALTHY_LOGS)]
     logs = logs_of(ready, "high", part(progress, 0.0, 0.7), whole=False)
-    baseline, good, *faulty = logs
+    baseline, good, *others = logs
+    faulty, healthy_logs = others[: len(LINES)], [baseline, *others[len(LINES) :]]
     healthy = diagnose(good, unit, baseline).status
     rows = []
     for number, (line, log) in enumerate(zip(LINES, faulty, strict=True), 1):
         component, mode, fault = line
-        change, channel = changed(good, log)
+        deviations, channel = deviation(healthy_logs, log)
         seen, answer = _answer(log, unit, baseline, fault)
-        rows.append(FmecaRow(component, mode, RATES[component], fault, change, channel, seen,
+        rows.append(FmecaRow(component, mode, RATES[component], fault, deviations, channel, seen,
                              answer))  # fmt: skip
         if progress is not None:
             progress(0.7 + 0.3 * number / len(LINES))
-    return FmecaResult(rows, healthy, seed, unit.hash)
+    alike = [
+        deviation([other for other in healthy_logs if other is not log], log)[0]
+        for log in healthy_logs
+    ]
+    return FmecaResult(rows, healthy, alike, seed, unit.hash)
 
 
 def _setup(unit: Actuator, fault: str, seed: int) -> Setup:
@@ -129,19 +145,29 @@ def _setup(unit: Actuator, fault: str, seed: int) -> Setup:
     return setups(procedure, unit, faults=[fault] if fault else [], seed=seed)[0]
 
 
-def changed(healthy: Log, faulty: Log) -> tuple[float, str]:
-    """Return by how many percent of its RMS a channel changes at most, and which one."""
-    sizes = {}
-    for role in healthy:
-        good, bad = healthy[role], faulty[role]
-        if not faulty.has(role) or good.dtype.kind != "f":
+def deviation(healthy: Sequence[Log], log: Log) -> tuple[float, str]:
+    """Return a log's largest deviation from healthy ones, and the channel that has it.
+
+    Of each channel the mean and the RMS about it are compared, over the samples that both have, in
+    standard deviations between the healthy logs.
+    """
+    found = {}
+    for role in healthy[0]:
+        if not log.has(role) or log[role].dtype.kind != "f":
             continue
-        both = min(len(good), len(bad))
-        scale = float(np.sqrt(np.mean(good**2)))
-        if scale > 0.0:
-            sizes[role] = 100.0 * float(np.sqrt(np.mean((bad[:both] - good[:both]) ** 2))) / scale
-    worst = max(sizes, key=lambda role: sizes[role])
-    return sizes[worst], worst
+        count = min(len(log[role]), *(len(item[role]) for item in healthy))
+        known = np.array([_statistics(item[role][:count]) for item in healthy])
+        spread = known.std(axis=0, ddof=1)
+        distance = np.abs(_statistics(log[role][:count]) - known.mean(axis=0))
+        moved = distance[spread > 0.0] / spread[spread > 0.0]
+        if moved.size:
+            found[role] = float(moved.max())
+    worst = max(found, key=lambda role: found[role])
+    return found[worst], worst
+
+
+def _statistics(values: Floats) -> Floats:
+    return np.array([values.mean(), values.std()])
 
 
 def _answer(log: Log, unit: Actuator, baseline: Log, fault: str) -> tuple[str, str]:
@@ -180,13 +206,15 @@ def fmeca_page(result: FmecaResult, date: str | None = None) -> Report:
         ("Failure mode", "mode"),
         ("Rate [1/h]", lambda row: f"{row.rate_per_h:.3g}"),
         ("Fault", "fault"),
-        ("Change [%]", "change_percent"),
+        ("Deviations", "deviations"),
         ("Channel", lambda row: row.channel.replace("_", " ")),
         ("Seen", "seen"),
         ("Answer", "answer"),
     )
     caption = (
-        "Rates as printed, of a component; change: of a channel's RMS against the healthy log."
+        "Rates as printed, of a component; deviations: of a channel's mean or RMS from healthy "
+        "logs, in their standard deviations: a healthy log reaches "
+        f"{max(result.healthy_deviations):.2g}."
     )
     report.section("Failure modes").table(table_of(result.rows, columns, caption, digits=3))
     made = {"Parameter hash": result.parameter_hash}
