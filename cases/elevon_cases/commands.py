@@ -81,7 +81,7 @@ def reproduce_all(
     only : list of str
         With --all: only this one; repeatable.
     data : path
-        With --all: the foreign data; else not run.
+        With --all: the foreign data, a folder for each case of its name; else not run.
     seed : int
         With --all: seed of every random number.
     date : str
@@ -161,14 +161,24 @@ def case_runs(
         record = records.get(case.name)
         if record is None or (only and case.name not in only):
             continue
-        given = {"data": data} if record.needs else {}
+        given = {"data": _data_of(case.name, data, only)} if record.needs else {}
         options = case.defaults() | dict(record.options) | given | {"seed": seed, "date": date}
         missing = record.needs and given.get(record.needs.removeprefix("--")) is None
         if missing and list(only) == [case.name]:
             raise UsageError(f"{case.name} needs its data: give {record.needs}")
-        absent = f"data absent: give {record.needs}" if missing else ""
+        absent = f"data absent: give {record.needs} FOLDER" if missing else ""
         runs.append(CaseRun(record, partial(_work, case, options), absent))
     return runs
+
+
+def _data_of(name: str, data: Path | None, only: Sequence[str]) -> Path | None:
+    """Return a case's part of the folder of foreign data: the folder of its name, or all of it."""
+    if data is None:
+        return None
+    own = data / name.removeprefix("real-")
+    if own.is_dir():
+        return own
+    return data if name == "cranfield" or list(only) == [name] else None
 
 
 def _work(case: PublishedCase, options: Mapping[str, Any], out: Path, progress: Any) -> Any:

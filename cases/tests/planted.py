@@ -130,7 +130,7 @@ def cranfield(alarms=2, **wrong):
 #: Cases whose checks need minutes or seconds of simulation.
 LONG = {"torino-backlash", "low-fidelity", "nasa-thermal", "pisa-friction"}  # fmt: skip
 
-GOOD = BENCH_GOOD | {
+GOOD = BENCH_GOOD | REAL_GOOD | {
     "torino-backlash": partial(with_error, "torino-backlash"),
     "torino-compliance": partial(with_error, "torino-compliance", resamples=20),
     "low-fidelity": partial(with_error, "low-fidelity"),
@@ -161,7 +161,7 @@ _B, _C, _T = (
 )
 
 #: Case and check, as `cases.toml` names it, to the checks with an error that this one must see.
-PLANTED = BENCH_PLANTED | {
+PLANTED = BENCH_PLANTED | REAL_PLANTED | {
     ("torino-backlash", "row *: recovered less put in"):
         _B((BACKLASH + "backlash_from_encoder", scaled(1.05, "loop_gain"))),
     ("torino-backlash", "largest: motor minus encoder less put in"):

@@ -167,7 +167,8 @@ def published() -> Mapping[str, Published]:
 @cache
 def works() -> tuple[PublishedWork, ...]:
     """Return every work with its tables and figures, each with the cases that cover it."""
-    names = ("torino-paper", "torino-bench", "torino-transmission", "nasa", "pisa", "cranfield")
+    names = ("torino-paper", "torino-bench", "torino-transmission", "nasa", "pisa", "cranfield",
+             "real-machines")  # fmt: skip
     return tuple(_work(name, packaged_toml(__name__, f"works/{name}.toml")) for name in names)
 
 
