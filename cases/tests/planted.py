@@ -28,6 +28,7 @@ from planted_nasa import (
     separation,
     slower,
 )
+from planted_real import REAL_GOOD, REAL_PLANTED
 from planting import given, scaled, with_error
 
 # --- torino-backlash -----------------------------------------------------------------------------
@@ -130,25 +131,29 @@ def cranfield(alarms=2, **wrong):
 #: Cases whose checks need minutes or seconds of simulation.
 LONG = {"torino-backlash", "low-fidelity", "nasa-thermal", "pisa-friction"}  # fmt: skip
 
-GOOD = BENCH_GOOD | REAL_GOOD | {
-    "torino-backlash": partial(with_error, "torino-backlash"),
-    "torino-compliance": partial(with_error, "torino-compliance", resamples=20),
-    "low-fidelity": partial(with_error, "low-fidelity"),
-    "nasa-current": current,
-    "nasa-faults": figures_and_seeding,
-    "nasa-flight": flown,
-    "nasa-thermal": partial(with_error, "nasa-thermal"),
-    "nasa-baseline": baseline,
-    "nasa-separation": separation,
-    "pisa-functional": functional,
-    "pisa-friction": FRICTION,
-    "pisa-hydraulic": gear.hydraulic_checks,
-    "pisa-validation": gear.validation_checks,
-    "pisa-commutation": commutation,
-    "pisa-monitoring": monitoring,
-    "pisa-failures": failures,
-    "cranfield": cranfield,
-}
+GOOD = (
+    BENCH_GOOD
+    | REAL_GOOD
+    | {
+        "torino-backlash": partial(with_error, "torino-backlash"),
+        "torino-compliance": partial(with_error, "torino-compliance", resamples=20),
+        "low-fidelity": partial(with_error, "low-fidelity"),
+        "nasa-current": current,
+        "nasa-faults": figures_and_seeding,
+        "nasa-flight": flown,
+        "nasa-thermal": partial(with_error, "nasa-thermal"),
+        "nasa-baseline": baseline,
+        "nasa-separation": separation,
+        "pisa-functional": functional,
+        "pisa-friction": FRICTION,
+        "pisa-hydraulic": gear.hydraulic_checks,
+        "pisa-validation": gear.validation_checks,
+        "pisa-commutation": commutation,
+        "pisa-monitoring": monitoring,
+        "pisa-failures": failures,
+        "cranfield": cranfield,
+    }
+)
 
 
 def error(case, *places):
