@@ -175,9 +175,9 @@ def _data_of(name: str, data: Path | None, only: Sequence[str]) -> Path | None:
     """Return a case's part of the folder of foreign data: the folder of its name, or all of it."""
     if data is None:
         return None
-    own = data / name.removeprefix("real-")
-    if own.is_dir():
-        return own
+    folder = data / name.removeprefix("real-")
+    if folder.is_dir():
+        return folder
     return data if name == "cranfield" or list(only) == [name] else None
 
 

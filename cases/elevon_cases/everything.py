@@ -31,7 +31,7 @@ from elevon_cases.catalogue import (
 
 PASS, FAIL, NOT_RUN = "pass", "fail", "not_run"
 _INDEX = ("index.html", "index.json")
-_SAID = ("passed", "kind", "basis")
+_NOTED = ("passed", "kind", "basis")
 """What the JSON form of a check says beside the check itself."""
 UNEXPLAINED = "no reason is known"
 
@@ -260,7 +260,7 @@ def _run(
 
 def _check(entry: Mapping[str, Any]) -> Check:
     """Return a check as it was kept; a value that was not finite is null there."""
-    known = {name: value for name, value in entry.items() if name not in _SAID}
+    known = {name: value for name, value in entry.items() if name not in _NOTED}
     value = entry["value"]
     return Check(**known | {"value": float("nan") if value is None else value})
 
@@ -342,12 +342,12 @@ def index_page(result: EveryCase, date: str | None) -> Report:
         report.fact(kind.replace("_", " "), counted(counts), KINDS[kind])
     _failed(report, [row for row in result.rows if row.verdict == FAIL])
     _not_run(report, [row for row in result.rows if row.verdict == NOT_RUN])
-    for own in (False, True):
+    for apart in (False, True):
         for work in works():
             mine = [row for row in result.rows if row.paper == work.name]
-            rows = [row for row in mine if own == (row.kind == SELF_CONSISTENCY)]
+            rows = [row for row in mine if apart == (row.kind == SELF_CONSISTENCY)]
             if rows:
-                title = f"Self-consistency: {work.title}" if own else work.title
+                title = f"Self-consistency: {work.title}" if apart else work.title
                 report.section(title).table(_table(rows))
     for work in works():
         report.section(f"Tables and figures: {work.title}").table(_items(work))

@@ -113,8 +113,8 @@ def test_what_has_no_data_is_not_run_and_no_failure(tmp_path):
 
 
 def test_ourselves_are_neither_counted_with_a_work_nor_beside_its_number(tmp_path):
-    own = Judgement("b", "self_consistency", "nasa Figure 9", "", "ours")
-    record = Published("one", {}, (*RECORD.checks, own))
+    apart = Judgement("b", "self_consistency", "nasa Figure 9", "", "ours")
+    record = Published("one", {}, (*RECORD.checks, apart))
     case = run_of(record, [Check("a b", 0.1, 0.3, "K"), Check("b", 0.1, 0.5, "K")])
     result = reproduce_everything([case], tmp_path, seed=0, key="k")
     one = {"pass": 1, "fail": 0, "not_run": 0}

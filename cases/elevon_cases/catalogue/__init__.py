@@ -61,9 +61,9 @@ class Judgement:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise unknown("kind of check", self.kind, KINDS, f"check '{self.check}'")
-        own = self.kind == SELF_CONSISTENCY
-        if own == bool(self.basis) or (own and self.theirs):
-            needs = "neither 'basis' nor 'theirs'" if own else "a 'basis'"
+        apart = self.kind == SELF_CONSISTENCY
+        if apart == bool(self.basis) or (apart and self.theirs):
+            needs = "neither 'basis' nor 'theirs'" if apart else "a 'basis'"
             raise InputError(f"check '{self.check}': kind {self.kind} takes {needs}")
 
     def judges(self, name: str) -> bool:

@@ -183,14 +183,20 @@ class RealMachineResult(CheckedResult):
         """Return a check of each printed number; one that no fit determined is not finite."""
         checks = []
         for printed in self.machine.printed:
-            rows = [row for row in self.rows if row.quantity == printed.quantity]
-            for row in [row for row in rows if not self._fit(row.fit).group] or [None]:
-                fit = "no fit" if row is None else row.fit
-                name = f"{fit}: {printed.quantity.replace('_', ' ')} less the authors'"
-                off = float("nan") if row is None or row.off_percent is None else row.off_percent
-                ours = None if row is None else row.value
-                checks.append(Check(name, abs(off), printed.percent, "%", ours=ours,
-                                    ours_unit=printed.unit))  # fmt: skip
+            rows = [
+                row
+                for row in self.rows
+                if row.quantity == printed.quantity and not self._fit(row.fit).group
+            ]
+            quantity = printed.quantity.replace("_", " ")
+            for row in rows:
+                off = float("nan") if row.off_percent is None else abs(row.off_percent)
+                name = f"{row.fit}: {quantity} less the authors'"
+                checks.append(Check(name, off, printed.percent, "%", ours=row.value,
+                                    ours_unit=row.unit))  # fmt: skip
+            if not rows:
+                name = f"no fit: {quantity} less the authors'"
+                checks.append(Check(name, float("nan"), printed.percent, "%"))
         return checks
 
     def _agreement(self) -> list[Check]:
@@ -271,10 +277,13 @@ def reproduce_machine(
     why: dict[str, str] = {}
     for number, fit in enumerate(machine.fits):
         logs = read_logs([folder / name for name in fit.logs], FOLDER / fit.map)
-        answer = elevon.calibrate(
-            logs, axis, torque_constant=fit.scale or None,
-            progress=part(progress, number / len(machine.fits), (number + 1) / len(machine.fits)),
-        )  # fmt: skip
+        share = part(progress, number / len(machine.fits), (number + 1) / len(machine.fits))
+        scale = fit.scale or None
+        try:
+            answer = elevon.calibrate(logs, axis, torque_constant=scale, progress=share)
+        except InputError as error:  # what it was to determine fails for want of a number
+            why[fit.name] = str(error)
+            continue
         subsystems = answer.to_dict(stored=False)["subsystems"]
         rows += _determined(fit, subsystems, machine.printed)
         why |= {f"{fit.name}, {name}": item["reason"] for name, item in subsystems.items()
