@@ -135,7 +135,7 @@ def faults(
 ) -> Answer:
     """List the fault catalogue: kind, places, unit, range, where each acts, effect, source, rate.
 
-    The rate is in failures an hour at one place.
+    The rate is in failures an hour of the part in all of its modes.
 
     With an actuator: only what acts in it, in its own ranges, with the drives under which it acts
     at each fidelity.

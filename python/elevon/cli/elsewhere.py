@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from elevon.live.bench import LiveBench
     from elevon.live.replay import LogReplay
     from elevon.report.checks import Check
-    from elevon.safety.campaign import SafetyResult
+    from elevon.safety.result import SafetyResult
 
 export = group("Write an actuator for other tools (docs/how-to/deploy.md).")
 
@@ -68,43 +68,55 @@ def run(
     return Answer(data, lambda: answer(text))
 
 
-@command(None, "date", door="elevon.safety:safety", working="safety campaign")
+@command(None, "date", door="elevon.safety:safety", working="safety campaign",
+         without=("hazards", "folder"))  # fmt: skip
 def safety(door: DoorCall, *, out: Path | None = None, force: bool = False) -> Answer:
-    """Run every failure, pairs and triples of them in every situation; list the hazards left.
+    """Run failures alone and together in many situations; say which hazards, how likely.
 
     Parameters
     ----------
     out : path
-        Folder for report.html and result.json.
+        Folder for report.html, result.json, fmea.csv, cutsets.csv, rows/; the same command goes on
+        after an interruption.
     """
     import json
 
     from elevon.safety.page import safety_report
+    from elevon.safety.tables import write_tables
 
-    pages = [] if out is None else [out / "report.html", out / "result.json"]
+    names = ("report.html", "result.json", "fmea.csv", "cutsets.csv")
+    pages = [] if out is None else [out / name for name in names]
     common.check_outputs(pages, force=force)
     model = common.read_actuator(door.options["actuator"], door.options["settings"])
-    result: SafetyResult = door(actuator=model)
+    result: SafetyResult = door(actuator=model, folder=out)
     values = result.to_dict()
     if out is not None:
         page = safety_report(result, model, date=door.options["date"])
         say(f"report: {page.save(pages[0], force=force)}")
         write_text(pages[1], json.dumps(values, indent=1) + "\n", force=force)
+        write_tables(result, model, out, force=force)
     code = 0 if values["status"] == "pass" else 1
-    return Answer(values, lambda: _print_hazards(values), code)
+    return Answer(values, lambda: _print_hazards(result), code)
 
 
-def _print_hazards(values: dict[str, Any]) -> None:
+def _print_hazards(result: SafetyResult) -> None:
+    met = sum(item.met for item in result.hazards)
+    status = str(result.to_dict()["status"]).upper()
     answer(
-        f"{values['status'].upper()}: {values['unsafe']} of {values['runs']} situations "
-        "show a hazard"
+        f"{status}: {result.unsafe} of {result.runs} situations show a hazard; {met} of "
+        f"{len(result.hazards)} hazards keep their target"
     )
     rows = [
-        [item["name"], *(str(item[key]) for key in ("rows", "listed", "single")),
-         f"{item['per_hour']:.1e}"]
-        for item in values["hazards"]
+        [item.name, item.severity, f"{item.mean:.1e}", f"{item.worst:.1e}", f"{item.target:.0e}",
+         "yes" if item.met else "no", str(len(item.cut_sets)), str(item.single)]
+        for item in result.hazards
     ]  # fmt: skip
-    print_table(["hazard", "rows", "listed", "by one failure", "per hour"], rows, title="hazards")
+    heads = ["hazard", "class", "mean 1/h", "worst 1/h", "target 1/h", "met", "cut sets", "single"]
+    print_table(heads, rows, title="hazards")
+    broken = [[check.name, f"{check.value:.3g}", f"{check.limit:.3g}"] for check in result.checks
+              if not check.passed]  # fmt: skip
+    if broken:
+        print_table(["rule not kept", "value", "limit"], broken)
 
 
 live_bench = typer.Typer(rich_markup_mode=None)

@@ -18,7 +18,7 @@ class FaultRecord:
     """What the core's catalogue says about one kind of fault.
 
     `not_modelled` says for each fidelity without it why; `targets` which parameters it moves at
-    each place. `rate` is in failures an hour at one place.
+    each place. `rate` is in failures an hour of the part in all of its modes.
     """
 
     kind: str

@@ -1,9 +1,20 @@
-"""The safety campaign of a control unit: many failures in many situations, judged by hazards."""
+"""The safety campaign of an actuator: failures in many situations, hazards, how likely they are."""
 
 from __future__ import annotations
 
-from elevon.safety.campaign import SafetyResult, safety
-from elevon.safety.hazards import HAZARDS, Hazard, observe
-from elevon.safety.rows import Row, population
+from elevon.safety.campaign import safety
+from elevon.safety.hazards import Hazard, Watched, lasting
+from elevon.safety.probability import Exposure, Frequency, Occurrence, frequency
+from elevon.safety.result import SafetyResult
 
-__all__ = ["HAZARDS", "Hazard", "Row", "SafetyResult", "observe", "population", "safety"]
+__all__ = [
+    "Exposure",
+    "Frequency",
+    "Hazard",
+    "Occurrence",
+    "SafetyResult",
+    "Watched",
+    "frequency",
+    "lasting",
+    "safety",
+]

@@ -1,257 +1,318 @@
-"""Run the safety campaign: every row at low fidelity, what is unsafe again at high."""
+"""Run the rows of a safety campaign: all at low fidelity, those near a limit at high."""
 
 from __future__ import annotations
 
+import hashlib
 import itertools
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.errors import InputError, SimulationError
-from elevon.faults.catalogue import find_record
-from elevon.option import Option
-from elevon.plain import WORKING, Plain, fields_of, key
+from elevon.option import Option, Quantity
 from elevon.progress import Progress, part
-from elevon.report.checks import Check, CheckedResult
-from elevon.safety.hazards import HAZARDS, RECORD, observe
-from elevon.safety.reasons import reason
-from elevon.safety.rows import Row, population, triples
+from elevon.safety.assessment import Assessment, assess
+from elevon.safety.hazards import Hazard, observe, read_targets, watched
+from elevon.safety.outcomes import Outcome, Outcomes
+from elevon.safety.probability import Exposure, frequency
+from elevon.safety.rates import Service, read_service
+from elevon.safety.result import SafetyResult, TripleSample
+from elevon.safety.rows import Row, together
+from elevon.safety.study import NEIGHBOUR, Study, study_of
 from elevon.simulate.prepare import ActuatorLike, as_actuator
+from elevon.worklog import WorkLog, finished
 
-WIRING = "landing_gear"
+WIRINGS = ("landing_gear", "rotary", "ballscrew")
 CHUNK = 256
 """Runs of one batch: what is kept of them at a time."""
 TRIPLES = 100
+"""Situations with three failures."""
+OTHERS = 0.02
+"""Share of the rows far from every limit that run at high fidelity, too."""
+EDGE = 0.2
+"""Share of the budget of high fidelity that the neighbours of rows at its edge decide on."""
 
 
-@dataclass(frozen=True)
-class HazardRow:
-    """A row that shows a hazard.
-
-    Attributes
-    ----------
-    hazard : str
-        Its name.
-    row : Row
-        Failures and situation.
-    time : float
-        When it begins, in s.
-    fidelity : str
-        At which it was judged last.
-    reason : str
-        Why no sensor could tell; empty: it is not listed.
-    """
-
-    hazard: str
-    row: Row
-    time: float
-    fidelity: str
-    reason: str
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the row of the JSON object."""
-        return fields_of(self, "hazard", "combination=row.combination", "situation=row.situation",
-                         "time", "fidelity", "reason")  # fmt: skip
-
-
-@dataclass(frozen=True)
-class HazardResult(Plain):
-    """One hazard: how many rows show it, how many of them are listed, how likely an hour is."""
-
-    COMPUTED = ("rows", "listed", "single", "per_hour")
-
-    name: str
-    severe: Annotated[bool, WORKING]
-    findings: Annotated[tuple[HazardRow, ...], WORKING]
-
-    @property
-    def rows(self) -> int:
-        """Rows that show it."""
-        return len(self.findings)
-
-    @property
-    def listed(self) -> int:
-        """Rows for which it is stated why no sensor could tell."""
-        return sum(bool(finding.reason) for finding in self.findings)
-
-    @property
-    def single(self) -> int:
-        """Rows with at most one failure."""
-        return sum(len(finding.row.faults) < 2 for finding in self.findings)
-
-    @property
-    def per_hour(self) -> float:
-        """Sum over the different combinations of the product of their rates, one hour each."""
-        combinations = {item.row.combination: item.row for item in self.findings}
-        return sum(per_hour(row) for row in combinations.values())
-
-
-@dataclass(frozen=True)
-class SafetyResult(CheckedResult):
-    """What the campaign showed.
+@dataclass
+class Runner:
+    """Runs rows in batches; what is finished is kept in the log.
 
     Attributes
     ----------
-    runs : int
-        Rows run at low fidelity.
-    repeated : int
-        Rows run again at high fidelity.
-    groups : dict
-        Rows of each part.
-    hazards : tuple of HazardResult
-        In the order of `HAZARDS`.
-    checks : list of Check
-        What was asked of it.
-    seed : int
-        Of surroundings and triples.
+    study : Study
+        Whose rows.
+    service : Service
+        With the monitors.
+    log : WorkLog or None
+        Finished batches; those that are there are not run again.
+    progress : callable, optional
+        Called with the fraction done.
     """
 
-    COMPUTED = ("rows", "unsafe")
+    study: Study
+    service: Service
+    log: WorkLog | None = None
+    progress: Progress | None = None
 
-    runs: int
-    repeated: Annotated[int, key("repeated_at_high")]
-    groups: dict[str, int]
-    hazards: tuple[HazardResult, ...]
-    checks: list[Check]
-    seed: int
+    def run(
+        self,
+        rows: Sequence[Row],
+        fidelity: str,
+        share: tuple[float, float],
+        actuators: Sequence[Actuator] = (),
+    ) -> list[Outcome]:
+        """Return what each row showed.
 
-    @property
-    def rows(self) -> list[HazardRow]:
-        """What shows a hazard, hazard by hazard."""
-        return [finding for item in self.hazards for finding in item.findings]
+        Parameters
+        ----------
+        rows : sequence of Row
+            In batches of `CHUNK`.
+        fidelity : str
+            high or low.
+        share : tuple of float
+            Of the progress, where it begins and ends.
+        actuators : sequence of Actuator, optional
+            One a row, in place of the study's.
 
-    @property
-    def unsafe(self) -> int:
-        """Situations that show a hazard, listed or not."""
-        return len({id(finding.row) for finding in self.rows})
+        Raises
+        ------
+        SimulationError
+            A run diverged.
+        """
+        out: list[Outcome] = []
+        low, high = share
+        for begin in range(0, len(rows), CHUNK):
+            chunk = rows[begin : begin + CHUNK]
+            span = [low + (high - low) * place / len(rows) for place in (begin, begin + len(chunk))]
+            models = actuators[begin : begin + CHUNK] or [self.study.actuator] * len(chunk)
+            name = _name(fidelity, chunk, models)
+            item = self.log.items.get(name) if self.log else None
+            if item is not None:
+                out += [Outcome.from_dict(data) for data in item.data["outcomes"]]
+                continue
+            results = self._batch(chunk, models, fidelity, part(self.progress, span[0], span[1]))
+            if self.log is not None:
+                self.log.note(name, (), outcomes=[outcome.to_dict() for outcome in results])
+            out += results
+        return out
+
+    def _batch(
+        self,
+        rows: Sequence[Row],
+        models: Sequence[Actuator],
+        fidelity: str,
+        progress: Callable[[float], bool] | None,
+    ) -> list[Outcome]:
+        from elevon.simulate import Run, simulate_batch
+
+        runs = [
+            Run(model, row.scenario(), 0, row.combination)
+            for model, row in zip(models, rows, strict=True)
+        ]
+        recordings = simulate_batch(
+            runs, fidelity=fidelity, record=self.study.record, progress=progress
+        )
+        return [self._outcome(*pair) for pair in zip(recordings, rows, strict=True)]
+
+    def _outcome(self, recording: Any, row: Row) -> Outcome:
+        if recording.status not in {"ok", "tripped"}:
+            raise SimulationError(
+                f"{row.combination}, {row.situation}: {recording.meta['message']}",
+                recording.status,
+            )
+        seen = watched(recording, row, self.study.limits)
+        distance, nearest = self.study.distance(seen)
+        messages = self.study.displayed(seen, self.service.monitors)
+        return Outcome(
+            observe(seen, self.study.hazards), tuple(messages), self.study.end(seen), distance,
+            nearest,
+        )  # fmt: skip
 
 
 def safety(
     actuator: ActuatorLike,
     *,
+    hazards: Sequence[Hazard] | None = None,
+    rates: Path | None = None,
+    checks: Path | None = None,
+    flight_time: Quantity | None = None,
+    target: Annotated[Sequence[str], Option(metavar="CLASS=P")] = (),
+    high: Annotated[int, Option(min=0)] = 1000,
+    all_high: bool = False,
     seed: int = 0,
     every: Annotated[int, Option(min=1)] = 1,
+    folder: Path | None = None,
     progress: Progress | None = None,
 ) -> SafetyResult:
-    """Run every row of the campaign and judge the hazards.
+    """Run every row of the campaign, judge the hazards, and find how likely they are.
 
     Parameters
     ----------
     actuator : Actuator, str or path
-        With a control unit that has states: the landing gear's.
+        A landing gear or a servo.
+    hazards : sequence of Hazard, optional
+        In place of the wiring's own: ``[*HAZARDS, mine]``.
+    rates : path, optional
+        Rates of parts, shares of their modes (TOML); they take the place of packaged ones.
+    checks : path, optional
+        Phases of flight, checks with intervals, monitors (TOML); as the rates.
+    flight_time : str or float, optional
+        Duration of a flight, such as '2 h'.
+    target : sequence of str
+        Largest probability of a class a flight hour; repeatable.
+    high : int
+        Rows nearest to a limit that run at high fidelity.
+    all_high : bool
+        Every row runs at high fidelity.
     seed : int
-        Of the surroundings' order and of the triples.
+        Of the surroundings' order, of the triples, of the rows drawn for high fidelity.
     every : int
         Only each N-th situation: a short form.
+    folder : path, optional
+        Where finished batches are kept: an interrupted campaign goes on there.
     progress : Progress, optional
         Called with the fraction done; returns False to stop.
 
     Raises
     ------
     InputError
-        Another wiring.
+        Another wiring; a wrong file; no rate for a failure.
     SimulationError
         A run diverged.
     """
     actuator = as_actuator(actuator)
-    if actuator.wiring != WIRING:
+    if actuator.wiring not in WIRINGS:
         raise InputError(
-            f"{actuator.name}: its wiring {actuator.wiring} has no control unit with states whose "
-            f"indications could be false; the campaign runs actuators of the wiring {WIRING}, "
-            "such as pisa-landing-gear"
+            f"{actuator.name}: the campaign has no situations for its wiring {actuator.wiring}; "
+            f"it runs actuators of the wirings {', '.join(WIRINGS)}"
         )
-    rows = [
-        *itertools.islice(population(WIRING, "low", seed), 0, None, every),
-        *triples(WIRING, "low", seed, max(1, TRIPLES // every)),
-    ]
-    first = list(judged(actuator, rows, "low", part(progress, 0.0, 0.8)))
-    repeated = list({id(row): row for _, row, _ in first}.values())
-    again = list(judged(actuator, repeated, "high", part(progress, 0.8, 1.0)))
-    # What shows at both fidelities is told as high judged it, what shows at one alone counts too.
-    seen = {(hazard, id(row)): (row, "low", time) for hazard, row, time in first}
-    seen |= {(hazard, id(row)): (row, "high", time) for hazard, row, time in again}
-    findings = [
-        HazardRow(hazard, row, time, fidelity, reason(hazard, row))
-        for (hazard, _), (row, fidelity, time) in seen.items()
-    ]
-    hazards = tuple(
-        HazardResult(item.name, item.severe,
-                     tuple(one for one in findings if one.hazard == item.name))
-        for item in HAZARDS
-    )  # fmt: skip
-    groups: dict[str, int] = {}
-    for row in rows:
-        groups[row.group] = groups.get(row.group, 0) + 1
-    checks = _checks(hazards, rows)
-    return SafetyResult(len(rows), len(repeated), groups, hazards, checks, seed)
+    targets = read_targets(target)
+    service = read_service(actuator.wiring, checks, flight_time)
+    study = study_of(actuator, hazards, rates, service.monitors)
+    work = _work(study, service, private=hazards is not None)
+    with finished(folder, work) as log:
+        runner = Runner(study, service, log, progress)
+        outcomes = _low(runner, seed, every)
+        assessment = Assessment(study, service, targets, seed)
+        triples = _triples(runner, assessment, outcomes, seed, max(1, TRIPLES // every))
+        chosen = _chosen(runner, outcomes, high // every, seed) if not all_high else None
+        _high(runner, outcomes, chosen)
+    return assess(assessment, outcomes, triples)
 
 
-def judged(
-    actuator: Actuator,
-    rows: Sequence[Row],
-    fidelity: str,
-    progress: Callable[[float], bool] | None = None,
-) -> Iterator[tuple[str, Row, float]]:
-    """Yield the hazards of each row and when they begin, in s.
+def _work(study: Study, service: Service, *, private: bool) -> str:
+    """Name of the work: what an outcome depends on beside its row.
 
-    Parameters
-    ----------
-    actuator : Actuator
-        What runs.
-    rows : sequence of Row
-        In batches of `CHUNK`.
-    fidelity : str
-        high or low; failures that it does not carry are left out of the catalogue's list, so a
-        row of low runs at high.
-    progress : callable, optional
-        Called with the fraction done.
-
-    Raises
-    ------
-    SimulationError
-        A run diverged.
+    A user's function is known to this process alone: its outcomes are not read back.
     """
-    from elevon.simulate import Run, simulate_batch
-
-    for begin in range(0, len(rows), CHUNK):
-        chunk = rows[begin : begin + CHUNK]
-        runs = [
-            Run(actuator, row.scenario(), 0, row.combination, begin + number)
-            for number, row in enumerate(chunk)
-        ]
-        recordings = simulate_batch(
-            runs, fidelity=fidelity, record=RECORD,
-            progress=part(progress, begin / len(rows), (begin + len(chunk)) / len(rows)),
-        )  # fmt: skip
-        for recording, row in zip(recordings, chunk, strict=True):
-            if recording.status not in {"ok", "tripped"}:
-                raise SimulationError(
-                    f"{row.combination}, {row.situation}: {recording.meta['message']}",
-                    recording.status,
-                )
-            yield from ((name, row, time) for name, time in observe(recording, row).items())
+    about = [study.record, service.monitors, [item.name for item in study.hazards]]
+    return f"safety {_digest(about)}{f' {id(study):x}' if private else ''}"
 
 
-def per_hour(row: Row) -> float:
-    """Return how often an hour the failures of a row come together, by the catalogue's rates.
+def _name(fidelity: str, rows: Sequence[Row], models: Sequence[Actuator]) -> str:
+    """Name of a batch: its rows and what they run on."""
+    return f"{fidelity} {_digest([rows, [model.hash for model in models]])}"
 
-    Parameters
-    ----------
-    row : Row
-        An upper bound: a failure is taken to last the hour.
+
+def _digest(value: object) -> str:
+    return hashlib.sha256(repr(value).encode()).hexdigest()[:24]
+
+
+def _low(runner: Runner, seed: int, every: int) -> Outcomes:
+    """Run all rows at low fidelity, their situations without a failure first."""
+    study = runner.study
+    rows = list(itertools.islice(study.rows(seed), 0, None, every))
+    tested = [row for row in rows if len(row.faults) == 1 and row.lasting]
+    switching = list(itertools.islice(study.switching_rows(), 0, None, max(1, every // 10)))
+    healthy = list(dict.fromkeys(row.healthy() for row in [*tested, *switching]))
+    known = set(rows)
+    rows += [row for row in healthy if row not in known]
+    outcomes = Outcomes(rows)
+    outcomes.add("low", range(len(rows)), runner.run(rows, "low", (0.0, 0.7)))
+    places = outcomes.append(switching)
+    outcomes.add("high", places, runner.run(switching, "high", (0.7, 0.75)))
+    return outcomes
+
+
+def _triples(
+    runner: Runner, assessment: Assessment, outcomes: Outcomes, seed: int, number: int
+) -> TripleSample:
+    """Draw situations with three failures, each set as often as its share of their frequency."""
+    every = runner.study.failures["low"]
+    draw = np.random.default_rng(seed)
+    occurrences = assessment.occurrences(assessment.failures(outcomes))
+    exposure = Exposure(runner.service.flight)
+    sets = [chosen for chosen in itertools.combinations(every, 3) if together(*chosen)]
+    weights = np.array([
+        frequency([occurrences[failure.name] for failure in chosen], exposure).mean
+        for chosen in sets
+    ])  # fmt: skip
+    total = float(weights.sum())
+    if total == 0.0:
+        return TripleSample((), 0.0)
+    picked = draw.choice(len(sets), number, p=weights / total)
+    rows = [runner.study.drawn(sets[index], draw) for index in picked]
+    places = outcomes.append(rows)
+    outcomes.add("low", places, runner.run(rows, "low", (0.75, 0.78)))
+    return TripleSample(tuple(places), total)
+
+
+def _chosen(
+    runner: Runner, outcomes: Outcomes, budget: int, seed: int
+) -> tuple[list[int], list[int]]:
+    """Return the rows that run at high fidelity: those near a limit, and some of the others.
+
+    A row of each minimal set that leads to a hazard comes first, then the rows by their distance
+    from a limit. At the edge of the budget those come first whose neighbours have other outcomes.
     """
-    rates = [find_record(fault.kind, fault.place, WIRING).rate for fault in row.faults]
-    return math.prod(rates)
+    low = outcomes.low
+    first = _representatives(outcomes)
+    ranked = sorted(low, key=lambda place: (place not in first, low[place].distance))
+    edge = round(EDGE * max(0, budget - len(first)))
+    certain, doubtful = ranked[: budget - edge], ranked[budget - edge : budget + edge]
+    moved = _moved(runner, outcomes, doubtful)
+    near = certain + sorted(doubtful, key=lambda place: place not in moved)[:edge]
+    outcomes.near = {place for place in low if low[place].distance < NEIGHBOUR} | moved
+    others = sorted(low.keys() - set(near) - outcomes.near)
+    count = round(OTHERS * len(others)) if budget else 0
+    drawn = np.random.default_rng(seed + 1).choice(len(others), count, replace=False)
+    return near, sorted(others[int(index)] for index in drawn)
 
 
-def _checks(hazards: Iterable[HazardResult], rows: Sequence[Row]) -> list[Check]:
-    """Nothing unlisted, and no single failure that leads to a severe hazard."""
-    checks = []
-    for item in hazards:
-        checks.append(Check(f"{item.name}: rows not listed", len(item.findings) - item.listed, 0.0))
-        if item.severe:
-            checks.append(Check(f"{item.name}: single failures", item.single, 0.0))
-    # At least one row, so that nothing passes by not having run.
-    return [*checks, Check("rows run", len(rows), 1.0, at_least=True)]
+def _representatives(outcomes: Outcomes) -> set[int]:
+    """Return a row of each set of failures that leads to a hazard and has no smaller one in it."""
+    by_hazard: dict[str, dict[frozenset[str], int]] = {}
+    for place in sorted(outcomes.low, key=lambda place: len(outcomes.rows[place].faults)):
+        names = frozenset(outcomes.rows[place].names)
+        for hazard in outcomes.low[place].hazards:
+            known = by_hazard.setdefault(hazard, {})
+            if not any(smaller <= names for smaller in known):
+                known[names] = place
+    return {place for known in by_hazard.values() for place in known.values()}
+
+
+def _moved(runner: Runner, outcomes: Outcomes, places: Sequence[int]) -> set[int]:
+    """Return the rows whose outcome changes where load, supply or friction move by a tenth."""
+    near = [
+        (place, *pair) for place in places for pair in runner.study.neighbours(outcomes.rows[place])
+    ]
+    rows, models = [row for _, _, row in near], [model for _, model, _ in near]
+    results = runner.run(rows, "low", (0.78, 0.82), models)
+    return {
+        place
+        for (place, _, _), outcome in zip(near, results, strict=True)
+        if outcome.differs(outcomes.low[place])
+    }
+
+
+def _high(runner: Runner, outcomes: Outcomes, chosen: tuple[list[int], list[int]] | None) -> None:
+    """Run the chosen rows at high fidelity, or all of them."""
+    near, drawn = chosen or (sorted(outcomes.low), [])
+    outcomes.drawn = tuple(drawn)
+    for places, share in ((near, (0.82, 0.95)), (drawn, (0.95, 1.0))):
+        rows = [outcomes.rows[place] for place in places]
+        outcomes.add("high", places, runner.run(rows, "high", share))
