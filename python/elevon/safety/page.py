@@ -19,7 +19,7 @@ from elevon.safety.tree import fault_tree
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MOST = 25
+_MOST = 20
 """Cut sets and failures of a table on the page; the files have all of them."""
 
 
