@@ -446,7 +446,8 @@ def new(
         Of the position loop.
     motor : list of str
         A constant of the motor's data sheet; repeatable: kind (brushless, servo, dc),
-        torque_constant, resistance, inductance, inertia, pole_pairs, current, peak_current.
+        torque_constant, resistance, inductance (or inductance_d, inductance_q), inertia,
+        pole_pairs, current, peak_current, iron_loss.
     title : str
         One line.
     source : str

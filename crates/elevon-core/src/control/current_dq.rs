@@ -43,13 +43,15 @@ pub struct CurrentControlState<S> {
     integral_q: S,
     pub voltage_d: S,
     pub voltage_q: S,
+    /// Size of the voltage that the controller wanted, before its limit.
+    pub wanted: S,
     /// Phase voltage references over half the supply, to be compared with the carrier.
     pub modulation: [S; 3],
     /// Those of the last sample, which act after the computation delay.
     computed: [S; 3],
 }
 
-kept!(CurrentControlState<f64> as CurrentControlState { integral_d, integral_q, voltage_d, voltage_q, modulation, computed });
+kept!(CurrentControlState<f64> as CurrentControlState { integral_d, integral_q, voltage_d, voltage_q, wanted, modulation, computed });
 
 /// What the current controller sees at a tick.
 #[derive(Clone, Copy, Debug)]
@@ -120,6 +122,7 @@ impl<S: Scalar> CurrentControl<S> {
         let limit = x.supply * S::splat(0.577_350_269_189_625_8);
         let bounded = Bounded::within(limit, [v_d, v_q]);
         [s.voltage_d, s.voltage_q] = bounded.voltage;
+        s.wanted = (v_d * v_d + v_q * v_q).sqrt();
         s.integral_d = S::select(bounded.holds(0, error_d), s.integral_d, s.integral_d + self.integral_step * error_d);
         s.integral_q = S::select(bounded.holds(1, error_q), s.integral_q, s.integral_q + self.integral_step * error_q);
         self.modulate(s, x);
@@ -141,7 +144,15 @@ impl<S: Scalar> CurrentControl<S> {
 impl<S: Scalar> CurrentControlState<S> {
     pub fn initial() -> Self {
         let zero = S::zero();
-        Self { integral_d: zero, integral_q: zero, voltage_d: zero, voltage_q: zero, modulation: [zero; 3], computed: [zero; 3] }
+        Self {
+            integral_d: zero,
+            integral_q: zero,
+            voltage_d: zero,
+            voltage_q: zero,
+            wanted: zero,
+            modulation: [zero; 3],
+            computed: [zero; 3],
+        }
     }
 
     /// The duties computed from the last sample act from now on.

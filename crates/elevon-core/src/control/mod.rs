@@ -2,6 +2,7 @@
 
 pub mod current_dq;
 pub mod derivative;
+pub mod limits;
 pub mod pi_rate;
 pub mod position_speed;
 pub mod sequence;

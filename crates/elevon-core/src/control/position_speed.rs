@@ -153,7 +153,7 @@ pub struct PositionSpeed<S> {
     derivative_gain: S,
     derivative_decay: S,
     speed_limit: S,
-    torque_limit: S,
+    pub torque_limit: S,
     per_torque_constant: S,
     threshold: S,
     back_step: S,
@@ -167,11 +167,13 @@ pub struct PositionSpeedState<S> {
     pub rested: S,
     pub speed_ref: S,
     pub torque_ref: S,
+    /// Limit of the torque reference: the controller's, or what derating and a direct current leave of it.
+    pub torque_limit: S,
     /// Command of the previous tick; NaN before the first.
     command: S,
 }
 
-kept!(PositionSpeedState<f64> as PositionSpeedState { integral, filtered_error, rested, speed_ref, torque_ref, command });
+kept!(PositionSpeedState<f64> as PositionSpeedState { integral, filtered_error, rested, speed_ref, torque_ref, torque_limit, command });
 
 impl<S: Scalar> PositionSpeed<S> {
     /// `ratio` is the motor's angle over the commanded coordinate.
@@ -220,7 +222,7 @@ impl<S: Scalar> PositionSpeed<S> {
             Mode::Position => self.position.gain * position_error,
             Mode::Speed => command,
             Mode::Torque => {
-                s.torque_ref = command.clamp_abs(self.torque_limit);
+                s.torque_ref = command.clamp_abs(s.torque_limit);
                 return s.torque_ref * self.per_torque_constant;
             }
         };
@@ -232,7 +234,7 @@ impl<S: Scalar> PositionSpeed<S> {
             torque = self.derivative_gain.fma(difference, torque);
             s.filtered_error = self.derivative_decay.fma(difference, s.filtered_error);
         }
-        s.torque_ref = torque.clamp_abs(self.torque_limit);
+        s.torque_ref = torque.clamp_abs(s.torque_limit);
         self.integrate(structure, s, error, torque, position_error, speed);
         s.torque_ref * self.per_torque_constant
     }
@@ -250,14 +252,14 @@ impl<S: Scalar> PositionSpeed<S> {
             torque = self.derivative_gain.fma(difference, torque);
             s.filtered_error = self.derivative_decay.fma(difference, s.filtered_error);
         }
-        s.torque_ref = torque.clamp_abs(self.torque_limit);
+        s.torque_ref = torque.clamp_abs(s.torque_limit);
         self.integrate(structure, s, error, torque, error, speed);
         s.torque_ref * self.per_torque_constant
     }
 
     /// 1 while the speed or the torque reference stands at its limit.
     pub fn limited(&self, s: &PositionSpeedState<S>) -> S {
-        S::indicator(self.speed_limit.le(s.speed_ref.abs()) | self.torque_limit.le(s.torque_ref.abs()))
+        S::indicator(self.speed_limit.le(s.speed_ref.abs()) | s.torque_limit.le(s.torque_ref.abs()))
     }
 
     #[inline(always)]
@@ -285,9 +287,10 @@ impl<S: Scalar> PositionSpeed<S> {
 }
 
 impl<S: Scalar> PositionSpeedState<S> {
-    pub fn initial() -> Self {
+    pub fn initial(torque_limit: S) -> Self {
         let zero = S::zero();
-        Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero, command: S::splat(f64::NAN) }
+        let command = S::splat(f64::NAN);
+        Self { integral: zero, filtered_error: zero, rested: zero, speed_ref: zero, torque_ref: zero, torque_limit, command }
     }
 }
 
@@ -317,7 +320,7 @@ mod tests {
 
     /// Torque references for position errors of one tick after the other.
     fn torques(controller: &(PositionSpeed<f64>, ControlStructure), errors: impl Iterator<Item = f64>) -> Vec<f64> {
-        let mut state = PositionSpeedState::initial();
+        let mut state = PositionSpeedState::initial(controller.0.torque_limit);
         errors.map(|e| controller.0.step(&controller.1, &mut state, e, 0.0, 7.0)).collect()
     }
 

@@ -156,6 +156,7 @@ impl<S: Scalar> DcLink<S> {
     }
 
     /// Energy of the capacitor above that of the start, J.
+    #[inline(always)]
     pub fn stored(&self, s: &DcLinkState<S>) -> S {
         let change = S::splat(0.5) * self.capacitance * (s.voltage * s.voltage - s.begin * s.begin);
         S::select(change.equals(change), change, S::zero())

@@ -3,6 +3,8 @@
 pub mod air_gap;
 pub mod cogging;
 pub mod equivalent;
+pub mod flux_map;
+pub mod iron_loss;
 pub mod magnetic_pull;
 pub mod pole;
 pub mod rub;

@@ -66,6 +66,8 @@ pub struct Network<S> {
 pub struct NetworkState<S> {
     pub winding: S,
     pub surface: S,
+    /// Iron loss at the last tick, J since the start.
+    iron: S,
     /// Heat of the phases, of shorted turns and of contacts in the winding since the last tick, J.
     pub collected: [S; 3],
     /// What of it is known to be heat of one phase's copper, J; the rest is even.
@@ -84,7 +86,7 @@ pub struct NetworkState<S> {
     pub over: S,
 }
 
-kept!(NetworkState<f64> as NetworkState { winding, surface, collected, windings, apart, hottest, power, heat_in, heat_out, begin, over });
+kept!(NetworkState<f64> as NetworkState { winding, surface, iron, collected, windings, apart, hottest, power, heat_in, heat_out, begin, over });
 
 impl<S: Scalar> Network<S> {
     /// `temperature` holds reference, coefficient of the resistance and of the flux; `period` the network's tick, s.
@@ -122,11 +124,12 @@ impl<S: Scalar> Network<S> {
     pub fn start(&self, winding: S, surface: S) -> NetworkState<S> {
         let zero = S::zero();
         let quasi = self.housing_capacity.equals(zero);
-        let settled = self.surface_after(winding, surface, zero, zero, zero);
+        let settled = self.surface_after(winding, surface, [zero; 2], zero, zero);
         let surface = S::select(quasi, settled, surface);
         NetworkState {
             winding,
             surface,
+            iron: zero,
             collected: [zero; 3],
             windings: [zero; 3],
             apart: [zero; 3],
@@ -150,6 +153,7 @@ impl<S: Scalar> Network<S> {
     }
 
     /// The air's.
+    #[inline(always)]
     pub fn air(&self) -> S {
         self.ambient
     }
@@ -162,35 +166,37 @@ impl<S: Scalar> Network<S> {
     }
 
     /// Surface temperature at the end of an implicit step: `gain` is its length over the winding's capacity,
-    /// `inertia` the housing's capacity over it.
-    fn surface_after(&self, winding: S, surface: S, power: S, gain: S, inertia: S) -> S {
+    /// `inertia` the housing's capacity over it; heat of the winding and of the iron, which lies at the surface.
+    fn surface_after(&self, winding: S, surface: S, [power, iron]: [S; 2], gain: S, inertia: S) -> S {
         let series = self.resistance + gain;
         // The winding's own balance, eliminated: what flows to the surface is (T_w + a P - T_s) / (R + a).
         let driving = winding + gain * power;
         let slope = inertia + S::one() / series + self.convection;
         let mut t = surface;
         for _ in 0..NEWTON {
-            let residue = inertia * (t - surface) - (driving - t) / series + self.lost_to_air(t);
+            let residue = inertia * (t - surface) - (driving - t) / series - iron + self.lost_to_air(t);
             t = t - residue / (slope + S::splat(4.0) * self.radiation * t * t * t);
         }
         t
     }
 
-    /// One tick with the heat collected since the last one.
-    pub fn tick(&self, s: &mut NetworkState<S>) {
+    /// One tick with the heat collected since the last one; `iron` is the motor's iron loss since the start, J.
+    pub fn tick(&self, s: &mut NetworkState<S>, iron: S) {
         let zero = S::zero();
         let quasi = self.housing_capacity.equals(zero);
         let [copper, loops, contact] = three!(|j| s.collected[j] / self.period);
         let power = copper + loops + contact;
+        let lost = (iron - s.iron) / self.period;
+        s.iron = iron;
         let gain = self.period / self.winding_capacity;
-        let surface = self.surface_after(s.winding, s.surface, power, gain, self.housing_capacity / self.period);
+        let surface = self.surface_after(s.winding, s.surface, [power, lost], gain, self.housing_capacity / self.period);
         let through = (s.winding + gain * power - surface) / (self.resistance + gain);
-        let out = S::select(quasi, through, self.lost_to_air(surface));
-        s.heat_in = s.heat_in + self.period * power;
+        let out = S::select(quasi, through + lost, self.lost_to_air(surface));
+        s.heat_in = s.heat_in + self.period * (power + lost);
         s.heat_out = s.heat_out + self.period * out;
         s.winding = s.winding + gain * (power - through);
         let capacity = S::select(quasi, S::one(), self.housing_capacity);
-        s.surface = S::select(quasi, surface, s.surface + self.period / capacity * (through - out));
+        s.surface = S::select(quasi, surface, s.surface + self.period / capacity * (through + lost - out));
         self.part_phases(s, power, gain);
         s.collected = [zero; 3];
         s.power = [copper, loops, contact, out];
@@ -210,6 +216,7 @@ impl<S: Scalar> Network<S> {
     }
 
     /// Temperature of the hottest phase.
+    #[inline(always)]
     pub fn hottest(&self, s: &NetworkState<S>) -> S {
         s.winding + s.apart[0].maximum(s.apart[1]).maximum(s.apart[2])
     }
@@ -221,11 +228,13 @@ impl<S: Scalar> Network<S> {
     }
 
     /// Heat in both nodes above that of the start, J.
+    #[inline(always)]
     pub fn stored(&self, s: &NetworkState<S>) -> S {
         self.winding_capacity * (s.winding - s.begin[0]) + self.housing_capacity * (s.surface - s.begin[1])
     }
 
     /// 1 while the winding is above its warning.
+    #[inline(always)]
     pub fn warns(&self, s: &NetworkState<S>) -> S {
         S::indicator(self.warning.lt(s.winding))
     }

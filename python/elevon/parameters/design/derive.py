@@ -204,6 +204,10 @@ def _motor(v: Values) -> None:
     for name in ("motor.current", "motor.peak_current"):
         if v.has(name) and not v.has("motor.torque_constant"):
             _refuse(v, name, "needs motor.torque_constant: which torque this current gives")
+    if v.has("motor.inductance_q") and v.has("motor.inductance"):
+        _refuse(v, "motor.inductance", "is given beside motor.inductance_q: one of them")
+    if v.has("motor.inductance_d") and not v.has("motor.inductance_q"):
+        _refuse(v, "motor.inductance_d", "needs motor.inductance_q: the other axis")
     if v.has("motor.peak_current") and v("control.current_limit") < v("current"):
         least = _text(v, "motor.current") if v.has("motor.current") else f"{v('current'):.4g} A"
         _refuse(

@@ -6,9 +6,11 @@ use super::shaft;
 use crate::actuator::Finding;
 use crate::control::current_dq::{largest_gain, PwmParameter};
 use crate::control::derivative::{Carrier, Relays, SpeedLoop};
+use crate::control::limits::LimitParameter;
 use crate::control::position_speed::ControlParameter as Control;
 use crate::inverter::bridge::InverterParameter as Inverter;
 use crate::motor::equivalent::LowParameter;
+use crate::motor::flux_map::FluxMapParameter;
 use crate::motor::star::{MotorParameter as Motor, ShortModel};
 use crate::motor::thermal::{ThermalModel, ThermalParameter as Thermal};
 use crate::motor::unbalance::UnbalanceParameter;
@@ -104,6 +106,8 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     drivetrain(out, raw);
     out.extend(resolver(raw));
     link(out, raw);
+    limits(out, raw);
+    linkages(out, raw);
     let (fsj, fdj) = (raw[FrictionParameter::Static.at()], raw[FrictionParameter::Dynamic.at()]);
     if fdj > fsj {
         out.push(finding("friction.dynamic", fdj, fsj, format!("friction.dynamic: {fdj} N m exceeds friction.static, {fsj} N m")));
@@ -113,6 +117,58 @@ fn common<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
     if lower >= upper {
         out.push(finding("stop.lower", lower, upper, format!("stop.lower: {lower} {unit} is not below stop.upper, {upper} {unit}")));
     }
+}
+
+/// Field weakening and derating against the current limit and each other.
+fn limits(out: &mut Vec<Finding>, raw: &[f64]) {
+    use crate::variable::Switch;
+    let at = |p: LimitParameter| raw[p.at()];
+    let on = |p: LimitParameter| Switch::read(at(p)) == Switch::On;
+    let most = raw[Control::CurrentLimit.at()];
+    let mut direct = at(LimitParameter::DirectCurrent).abs();
+    let mut path = "control.direct_current";
+    if on(LimitParameter::FieldWeakening) {
+        direct += at(LimitParameter::FieldWeakeningCurrent);
+        path = "control.field_weakening_current";
+    }
+    if drive(raw) == DriveKind::Pwm && direct >= most {
+        let message = format!("{path}: {direct} A of direct current leave nothing for the torque below control.current_limit, {most} A");
+        out.push(finding(path, direct, most, message));
+    }
+    let (start, end) = (at(LimitParameter::DeratingStart), at(LimitParameter::DeratingEnd));
+    if on(LimitParameter::Derating) && end <= start {
+        let path = "control.derating_end";
+        out.push(finding(path, end, start, format!("{path}: {end} K must be above control.derating_start, {start} K")));
+    }
+}
+
+/// Are the flux linkages other than L i? Then no turns may be missing.
+fn linkages(out: &mut Vec<Finding>, raw: &[f64]) {
+    use crate::motor::short::{ShortParameter as S, TapParameter as T};
+    let at = |p: FluxMapParameter| raw[p.at()];
+    let mapped = at(FluxMapParameter::Saliency) != 1.0 || at(FluxMapParameter::SaturationCurrent) != 0.0;
+    let turns = (0..3).map(|j| raw[Motor::TurnsA.at() + j]).fold(1.0, f64::min);
+    let contacts = [T::TapLevelA, T::TapLevelB, T::TapLevelC].map(|p| raw[p.at()]).into_iter().fold(0.0, f64::max);
+    let shorts = [S::PhaseShortAb, S::PhaseShortBc, S::PhaseShortCa, S::GroundShortA, S::GroundShortB, S::GroundShortC];
+    let shorts = shorts.map(|p| raw[p.at()]).into_iter().fold(contacts, f64::max);
+    if mapped && (turns < 1.0 || shorts > 0.0) {
+        let path = if at(FluxMapParameter::Saliency) != 1.0 { "motor.saliency" } else { "motor.saturation_current" };
+        let message = format!(
+            "{path}: the flux linkages of a salient or saturating motor are those of a whole winding; with shorted turns (motor.turns_a to c), \
+             taps or contacts they are not modelled: set motor.saliency = 1 and motor.saturation_current = 0"
+        );
+        out.push(finding(path, turns, 1.0, message));
+    }
+}
+
+/// Share of the inductances that is left at the current limit, at least.
+fn least_inductance(raw: &[f64]) -> f64 {
+    let at = |p: FluxMapParameter| raw[p.at()];
+    let (saliency, limit) = (at(FluxMapParameter::Saliency), at(FluxMapParameter::SaturationCurrent));
+    let most = raw[Control::CurrentLimit.at()];
+    let reached =
+        if limit > 0.0 { (most * most + saliency * (most + at(FluxMapParameter::SaturationBias)).powi(2)) / (limit * limit) } else { 0.0 };
+    saliency.min(1.0) / (1.0 + reached).powf(1.5)
 }
 
 /// Link, chopper and trips against each other: what trips at once cannot run, what comes too late or never is warned of.
@@ -337,7 +393,7 @@ fn steps<F: Form>(out: &mut Vec<Finding>, raw: &[f64]) {
 /// Missing turns make a phase faster. Turns shorted in a loop, as every other contact, do not: their currents move
 /// implicitly, and the leg's slope is limited by the phases through which its current returns.
 fn windings(out: &mut Vec<Finding>, raw: &[f64], dt: f64) {
-    let (r, l) = (raw[Motor::WindingResistance.at()], raw[Motor::WindingInductance.at()]);
+    let (r, l) = (raw[Motor::WindingResistance.at()], raw[Motor::WindingInductance.at()] * least_inductance(raw));
     let turns = turns_left(raw);
     step_limit(out, dt, turns * l / r, "electrical pole R / L of motor.winding_resistance and motor.winding_inductance");
     let reduced = ShortModel::read(raw[Motor::ShortModel.at()]) == ShortModel::Reduced;

@@ -7,12 +7,14 @@ use super::shaft::{ShaftDetails, ShaftNeeds};
 use super::signals::HighSignal as Q;
 use crate::actuator::Setup;
 use crate::control::current_dq::PwmParameter;
+use crate::control::limits::LimitStructure;
 use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::{self, BridgeStructure};
 use crate::inverter::hysteresis::RelayCrossing;
 use crate::inverter::link::DcLink;
 use crate::inverter::losses;
+use crate::motor::flux_map::FluxMap;
 use crate::motor::pole::WeakPole;
 use crate::motor::short::{self, ShortStructure};
 use crate::motor::star::{interrupted, warms, MotorStructure};
@@ -28,6 +30,7 @@ details! {
     always {
         drive: DriveKind = DriveKind::read(x.parts.drive().value(DriveParameter::Kind));
         control: ControlStructure = ControlStructure::read(&x.parts.control());
+        limits: LimitStructure = LimitStructure::read(&x.parts.limits(), drive == DriveKind::Pwm, Network::<f64>::needed(&x.parts.thermal()));
         shaft: ShaftDetails = ShaftDetails::read::<F>(&ShaftNeeds::high::<F>(x.parts, records(x.parts, F::HIGH, "energy")));
         sensing: SensingDetails = SensingDetails::read::<F>(x.parts);
         motor: MotorStructure = MotorStructure::read(&x.parts.motor()).with_unbalance(shaft.unbalance).with_weak_pole(WeakPole::<f64>::needed(&x.parts.pole()));
@@ -58,6 +61,8 @@ details! {
         switching = x.switches();
         heat = Network::<f64>::needed(&x.parts.thermal());
         shorted = shorts.contains(&true);
+        /// The flux linkages are other than L i.
+        mapped = FluxMap::<f64>::needed(&x.parts.flux_map());
         current_filter = x.parts.current_sensor().value(CurrentSensorParameter::Bandwidth) > 0.0;
         six_step = Commutation::read(x.parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         /// A lost resolver opens the bridge.

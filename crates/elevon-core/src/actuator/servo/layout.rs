@@ -2,6 +2,7 @@
 
 use crate::actuator::Port;
 use crate::control::current_dq::{PwmParameter, PWM};
+use crate::control::limits::{LimitParameter, LIMITS};
 use crate::control::position_speed::{ControlParameter, CONTROL};
 use crate::inverter::bridge::{InverterParameter, INVERTER};
 use crate::inverter::hysteresis::{RelayParameter, RELAYS};
@@ -9,6 +10,8 @@ use crate::inverter::link::{LinkParameter, LINK};
 use crate::inverter::losses::{DriveHeatParameter, SwitchingParameter, DRIVE_HEAT, SWITCHING};
 use crate::motor::cogging::{CoggingParameter, COGGING};
 use crate::motor::equivalent::{LowParameter, LOW};
+use crate::motor::flux_map::{FluxMapParameter, FLUX_MAP};
+use crate::motor::iron_loss::{IronLossParameter, IRON_LOSS};
 use crate::motor::magnetic_pull::{MagneticPullParameter, MAGNETIC_PULL};
 use crate::motor::pole::{PoleParameter, POLE};
 use crate::motor::rub::{RubParameter, RUB};
@@ -124,6 +127,9 @@ groups! {
     drive_heat: "thermal", DRIVE_HEAT, DriveHeatParameter;
     rub: "motor", RUB, RubParameter;
     lubricant: "lubricant", &GREASE, LubricantParameter;
+    flux_map: "motor", FLUX_MAP, FluxMapParameter;
+    iron_loss: "motor", IRON_LOSS, IronLossParameter;
+    limits: "control", LIMITS, LimitParameter;
 }
 
 pub const PORTS: &[Port] = &[

@@ -39,7 +39,7 @@ signals! {
         PhaseShortCurrentCa => "phase_short_current_ca", "-", "A", "current from winding c to winding a through a contact";
         GroundCurrent => "ground_current", "-", "A", "current from the windings to ground";
         MotorTorque => "motor_torque", "T_m", "N m", "electromagnetic torque after the flux's saturation";
-        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the motor shaft, the brake's included";
+        FrictionTorque => "friction_torque", "T_fric", "N m", "dry and viscous friction on the motor shaft, the brake's and the iron's drag included";
         BrakeTorque => "brake_torque", "T_b", "N m", "torque the brake can oppose", Brake;
         LoadTorque => "load_torque", "T_load", "N m", "signed load referred to the motor shaft";
         OutputTorque => "output_torque", "T_u", "N m", "load on the output side, spring included", Load;
@@ -87,6 +87,8 @@ signals! {
         HeatDrive => "heat_drive", "-", "W", "losses of the inverter, mean of the network's last tick";
         StopTorque => "stop_torque", "-", "N m", "torque of the end stop at the motor shaft: what its reaction cancels, or of its stiffness and damping (stop.stiffness)";
         AmbientTemperature => "ambient_temperature", "T_a", "K", "temperature of the air: thermal.ambient, or the input `ambient`";
+        EnergyIron => "energy_iron", "-", "J", "iron losses of the motor";
+        HeatIron => "heat_iron", "P_Fe", "W", "iron loss of the motor at the present speed";
     }
 }
 
@@ -131,6 +133,8 @@ signals_of! {
         EnergyLink;
         StopTorque;
         AmbientTemperature;
+        EnergyIron;
+        HeatIron;
     }
 }
 

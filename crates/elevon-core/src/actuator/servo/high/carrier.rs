@@ -2,7 +2,8 @@
 //! the windings' EMF and torque are those of the rotor's position at the middle of the step, the currents' means over it
 //! make the torque, and the resistance acts on that mean. All of it is of second order in the step.
 
-use super::electric::{book, connect, coupling_at, resistance, Coupling, Fed, Gates};
+use super::electric::{book, connect, coupling_at, motor_torque, resistance, Coupling, Fed, Gates};
+use super::mapped::mapped_step;
 use super::model::{Model, State};
 use super::shorted::shorted_step;
 use super::step::{acquire, lose_switching, measure, move_on, park, sense, Feed};
@@ -132,7 +133,11 @@ fn wind<S: Scalar, const FULL: bool>(
     let gates = Gates::Within(Pulses { legs: &commands.pulses, before: commands.before, lost: commands.lost });
     if structure.shorted {
         let (turns, voltage) = shorted_step(m, structure, s, c, &Fed { half_supply, gates, resistance });
-        return Wound { current: turns, voltage, torque: mean_torque(m, c, old, turns) };
+        return Wound { current: turns, voltage, torque: mean_torque(m, structure, c, [old, turns]) };
+    }
+    if structure.mapped {
+        let (current, voltage) = mapped_step(m, structure, s, c, &Fed { half_supply, gates, resistance });
+        return Wound { current, voltage, torque: mean_torque(m, structure, c, [old, current]) };
     }
     let (wound, rail, ends) = if structure.bridge {
         bridged(m, structure, s, c, &Fed { half_supply, gates, resistance })
@@ -162,11 +167,11 @@ fn bridged<S: Scalar>(
     let Some(neutral) = connection.loose else {
         return (wound, legs.rail, legs.voltage);
     };
-    let (loose, terminal) = afloat(m, c, legs, neutral, &windings);
+    let (loose, terminal) = afloat(m, structure, c, legs, neutral, &windings);
     let whole = legs.connected[0] & legs.connected[1] & legs.connected[2];
     let current = extinguish(legs, old, three!(|j| S::select(whole, wound.current[j], loose.current[j])));
     let same: [S::Mask; 3] = three!(|j| current[j].equals(wound.current[j]));
-    wound.torque = S::select(whole & same[0] & same[1] & same[2], wound.torque, mean_torque(m, c, old, current));
+    wound.torque = S::select(whole & same[0] & same[1] & same[2], wound.torque, mean_torque(m, structure, c, [old, current]));
     wound.voltage = three!(|j| S::select(whole, wound.voltage[j], loose.voltage[j]));
     wound.current = current;
     (wound, legs.rail, terminal)
@@ -174,19 +179,26 @@ fn bridged<S: Scalar>(
 
 /// With legs that carry nothing, whose phases have their EMF over the neutral; and the terminals.
 #[inline(always)]
-fn afloat<S: Scalar>(m: &Model<S>, c: &Coupling<S>, legs: &Legs<S>, neutral: S, w: &Windings<S>) -> (Wound<S>, [S; 3]) {
+fn afloat<S: Scalar>(
+    m: &Model<S>,
+    structure: &Structure,
+    c: &Coupling<S>,
+    legs: &Legs<S>,
+    neutral: S,
+    w: &Windings<S>,
+) -> (Wound<S>, [S; 3]) {
     let terminal: [S; 3] = three!(|j| S::select(legs.connected[j], legs.voltage[j], neutral + w.emf[j]));
     let drop = three!(|j| (-w.resistance[j]).fma(w.current[j], terminal[j] - w.emf[j]));
     let current = m.star.currents_after(w.current, drop, neutral);
-    let torque = mean_torque(m, c, w.current, current);
+    let torque = mean_torque(m, structure, c, [w.current, current]);
     let wound = Wound { current, voltage: three!(|j| terminal[j] - neutral), torque };
     (wound, terminal)
 }
 
 /// Torque of the currents' mean over a step.
 #[inline(always)]
-fn mean_torque<S: Scalar>(m: &Model<S>, c: &Coupling<S>, old: [S; 3], new: [S; 3]) -> S {
-    m.star.torque(c.k, three!(|j| S::splat(0.5) * (old[j] + new[j])))
+fn mean_torque<S: Scalar>(m: &Model<S>, structure: &Structure, c: &Coupling<S>, [old, new]: [[S; 3]; 2]) -> S {
+    motor_torque::<S, true>(m, structure, c, three!(|j| S::splat(0.5) * (old[j] + new[j])))
 }
 
 /// Sines and cosines of the phases at a shaft angle.

@@ -1,5 +1,6 @@
 //! Windings and bridge of a step.
 
+use super::mapped::mapped_step;
 use super::model::*;
 use super::shorted::shorted_step;
 use crate::actuator::servo::details::Structure;
@@ -12,6 +13,8 @@ use crate::three;
 pub(crate) struct Coupling<S> {
     /// k_j of the phases.
     pub k: [S; 3],
+    /// Sine and cosine of the electrical angle.
+    pub turn: [S; 2],
 }
 
 #[inline(always)]
@@ -30,12 +33,16 @@ pub(crate) fn coupling_at<S: Scalar, const FULL: bool>(
 ) -> Coupling<S> {
     let flux = structure.thermal.then_some(s.star.flux_factor);
     let k = m.star.coefficients::<FULL>(&structure.motor, Some(&m.extra.pole), position, [sin, cos], flux);
-    Coupling { k: m.star.under_load(k, s.star.current) }
+    Coupling { k: m.star.under_load(k, s.star.current), turn: [sin, cos] }
 }
 
 #[inline(always)]
-pub(crate) fn motor_torque<S: Scalar>(m: &Model<S>, s: &State<S>, c: &Coupling<S>) -> S {
-    m.star.torque(c.k, s.star.current)
+pub(crate) fn motor_torque<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, c: &Coupling<S>, current: [S; 3]) -> S {
+    let torque = m.star.torque(c.k, current);
+    if EXTRA && structure.mapped {
+        return torque + m.extra.map.torque(m.extra.map.currents(c.turn, current));
+    }
+    torque
 }
 
 /// What switches the legs during a step.
@@ -98,6 +105,9 @@ pub(crate) fn electric_step<S: Scalar, const FULL: bool, const EXTRA: bool>(
     if EXTRA && structure.shorted {
         let (turns, voltage) = shorted_step(m, structure, s, c, &Fed { half_supply, gates, resistance });
         return (three!(|j| turns[j]), three!(|j| voltage[j]));
+    }
+    if EXTRA && structure.mapped {
+        return mapped_step(m, structure, s, c, &Fed { half_supply, gates, resistance });
     }
     let speed = s.shaft.motor_speed;
     let i = three!(|j| s.star.current[j]);

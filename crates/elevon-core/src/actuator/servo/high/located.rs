@@ -4,7 +4,7 @@
 
 use super::carrier::middle;
 use super::crossing::{turned, Seen, Switched};
-use super::electric::coupling_at;
+use super::electric::{coupling_at, motor_torque};
 use super::model::{Model, State};
 use super::step::{acquire, lose_switching, measure, move_on, park, sense, Feed};
 use super::Behind;
@@ -64,7 +64,7 @@ fn step<S: Scalar, const FULL: bool>(m: &Model<S>, structure: &Structure, x: &In
     let circuit = Switched { model: m, structure, coupling: &coupling, half_supply: half * feed.supply };
     let seen = Seen { error, shape: turned::<S, FULL>(m, structure, [sines, cosines], rate) };
     let wound = circuit.step::<FULL>(s, old_legs, &seen);
-    let torque = m.star.torque(coupling.k, wound.mean);
+    let torque = motor_torque::<S, FULL>(m, structure, &coupling, wound.mean);
     feed.end::<FULL>(m, structure, s);
     if structure.acquisition {
         let (v_q, _) = park(wound.voltage, sines, cosines);

@@ -4,6 +4,7 @@ mod carrier;
 mod crossing;
 mod electric;
 mod located;
+mod mapped;
 mod model;
 mod observe;
 mod shorted;

@@ -7,12 +7,14 @@ use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::{Sensed, Sensing};
 use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::{CurrentControl, CurrentControlState, PwmParameter};
+use crate::control::limits::Limits;
 use crate::control::position_speed::{ControlParameter, PositionSpeed, PositionSpeedState};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
 use crate::inverter::carrier::{Carrier, Window};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::inverter::losses::{DriveHeat, DriveHeatState, SwitchingParameter};
 use crate::kept;
+use crate::motor::flux_map::FluxMap;
 use crate::motor::pole::WeakPole;
 use crate::motor::short::{Discrete, Shorts};
 use crate::motor::star::{MotorParameter, Star, StarState};
@@ -46,6 +48,8 @@ pub struct Model<S> {
 pub(crate) struct Extra<S> {
     pub shorts: Shorts<S>,
     pub pole: WeakPole<S>,
+    pub map: FluxMap<S>,
+    pub limits: Limits<S>,
     pub link: DcLink<S>,
     pub switching_time: S,
     pub network: Network<S>,
@@ -98,13 +102,16 @@ pub(crate) struct ExtraState<S> {
     pub sensed: [S; 3],
     /// Current reference of the last step, where crossings of the relays are located.
     pub last_reference: S,
+    /// Direct current of the field weakening, A, and the share of the current limit that the temperature leaves.
+    pub weakening: S,
+    pub derated: S,
     pub link: DcLinkState<S>,
     pub drive_heat: DriveHeatState<S>,
     /// The contacts' network at the present parameters and temperature.
     pub contacts: Discrete<S>,
 }
 
-kept!(ExtraState<f64> as ExtraState { network, sensed, last_reference, link, drive_heat, contacts });
+kept!(ExtraState<f64> as ExtraState { network, sensed, last_reference, weakening, derated, link, drive_heat, contacts });
 
 /// Accounts of the electrical part; those of the shaft are its own.
 pub(crate) const E_SUPPLY: usize = 0;
@@ -155,6 +162,13 @@ impl<S: Scalar> Model<S> {
             extra: Extra {
                 shorts: Shorts::derive(view.motor(), view.tap(), view.short(), &star, structure.motor.shorted_loop, dt),
                 pole: WeakPole::derive(view.pole(), at(MotorParameter::PolePairs.at())),
+                map: FluxMap::derive(view.flux_map(), view.motor()),
+                limits: Limits::derive(
+                    view.limits(),
+                    [at(MotorParameter::PolePairs.at()) * at(PwmParameter::Inductance.at()), at(PwmParameter::EmfConstant.at())],
+                    at(ControlParameter::CurrentLimit.at()),
+                    at(PwmParameter::SampleTime.at()),
+                ),
                 link: DcLink::derive(view.link(), dt),
                 switching_time: at(SwitchingParameter::SwitchingTime.at()),
                 network: network(raw, dt0),

@@ -143,12 +143,13 @@ fn ideal_voltage<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, s
 fn mechanical<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &State<S>, out: &mut [S]) -> ShaftSignals<S> {
     let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
     let c = coupling::<S, true>(m, structure, s, sin, cos);
-    let torque = motor_torque(m, s, &c);
+    let torque = motor_torque::<S, true>(m, structure, &c, s.star.current);
     let signals = m.shaft.observe(&structure.shaft, x, &s.shaft, torque);
     let mut set = |q: Q, x: S| out[q as usize] = x;
     set(Q::OutputSpeed, signals.output_speed);
     set(Q::MotorTorque, torque);
     set(Q::UnbalanceTorque, signals.unbalance);
+    set(Q::HeatIron, signals.iron);
     set(Q::FrictionTorque, signals.friction);
     set(Q::BrakeTorque, signals.brake);
     set(Q::LoadTorque, signals.load);
@@ -174,6 +175,7 @@ fn energies<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, out: &
         (Q::EnergyBrake, w.brake),
         (Q::EnergyLoad, w.load),
         (Q::EnergyImpact, w.impact),
+        (Q::EnergyIron, w.iron),
         (Q::EnergyKinetic, m.shaft.kinetic(&structure.shaft, &s.shaft)),
     ] {
         out[q as usize] = value;
@@ -183,5 +185,11 @@ fn energies<S: Scalar>(m: &Model<S>, structure: &Structure, s: &State<S>, out: &
     out[Q::EnergyAir as usize] = s.extra.network.heat_out + drive.heat_out;
     let half = S::splat(0.5);
     let magnetic = (0..3).fold(S::zero(), |sum, j| sum + half * s.star.current[j] * s.star.current[j] / m.star.per_inductance[j]);
+    let magnetic = if structure.mapped {
+        let (sin, cos) = m.star.electrical_angle(s.shaft.motor_position).sin_cos();
+        m.extra.map.energy(m.extra.map.currents([sin, cos], s.star.current))
+    } else {
+        magnetic
+    };
     out[Q::EnergyMagnetic as usize] = magnetic + m.extra.shorts.magnetic(&structure.shorts, &s.star.contact);
 }

@@ -44,7 +44,7 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
         window: Window::initial(),
         commands: [-S::one(); 3],
         bridge: BridgeState::initial(),
-        control: PositionSpeedState::initial(),
+        control: PositionSpeedState::initial(model.control.torque_limit),
         current_ref: zero,
         current_control: CurrentControlState::initial(),
         shaft,
@@ -60,6 +60,8 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
             network: warm,
             sensed: star.current,
             last_reference: S::splat(f64::NAN),
+            weakening: zero,
+            derated: model.extra.limits.derated(warm.winding),
             link: DcLinkState::initial(),
             drive_heat: model.extra.drive_heat.start(),
             contacts: discrete(model, &star),
@@ -70,9 +72,21 @@ pub(crate) fn start<S: Scalar>(model: &Model<S>, raw: &[S], initial: &[S]) -> St
 pub(crate) fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
     heat(raw, &mut state.star, &state.extra.network);
     lubricate(model, structure, state);
+    limit(model, structure, state);
     state.window.renew();
     if structure.shorted {
         state.extra.contacts = discrete(model, &state.star);
+    }
+}
+
+/// Limit of the torque reference at the present temperature and direct current.
+#[inline(always)]
+pub(crate) fn limit<S: Scalar>(m: &Model<S>, structure: &Structure, s: &mut State<S>) {
+    s.control.torque_limit = m.control.torque_limit;
+    if structure.limits.moves() {
+        let derated = if structure.limits.derates { s.extra.derated } else { S::one() };
+        let left = m.extra.limits.left(derated, m.extra.limits.reference(s.extra.weakening));
+        s.control.torque_limit = m.control.torque_limit * left;
     }
 }
 

@@ -228,7 +228,7 @@ fn step<S: Scalar, const FULL: bool, const EXTRA: bool>(m: &Model<S>, structure:
 
     // Motor electromagnetics.
     let c = coupling::<S, FULL>(m, structure, s, sin, cos);
-    let torque = motor_torque(m, s, &c);
+    let torque = motor_torque::<S, EXTRA>(m, structure, &c, s.star.current);
     let (i, v) = electric_step::<S, FULL, EXTRA>(m, structure, s, &c, half_supply, old_legs);
     let (current, voltage) = (three!(|j| i[j]), three!(|j| v[j]));
     feed.end::<EXTRA>(m, structure, s);

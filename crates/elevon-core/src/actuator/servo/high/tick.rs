@@ -3,7 +3,7 @@
 
 use super::model::{Model, State, E_INVERTER};
 use super::shorted::discrete;
-use super::start::lubricate;
+use super::start::{limit, lubricate};
 use super::step::{control_step, link_voltage, park, seen_current, shaft_reading};
 use crate::actuator::servo::details::{sample_steps, Structure};
 use crate::actuator::servo::layout::*;
@@ -72,10 +72,14 @@ impl<S: Scalar> Kernel for Event<'_, Structure, Model<S>, State<S>, S> {
 /// The heat of the last period flows, and warms windings and magnets.
 #[inline(always)]
 fn warm<S: Scalar>(structure: &Structure, m: &Model<S>, s: &mut State<S>) {
-    m.extra.network.tick(&mut s.extra.network);
+    m.extra.network.tick(&mut s.extra.network, s.shaft.work.iron);
     m.shaft.nut.tick(&mut s.shaft.nut);
     m.extra.drive_heat.tick(&mut s.extra.drive_heat, s.energy[E_INVERTER]);
     (s.star.resistance_factor, s.star.flux_factor) = m.extra.network.factors(&s.extra.network);
+    if structure.limits.derates {
+        s.extra.derated = m.extra.limits.derated(s.extra.network.winding);
+        limit(m, structure, s);
+    }
     lubricate(m, structure, s);
     if structure.shorted {
         s.extra.contacts = discrete(m, &s.star);
@@ -93,8 +97,14 @@ fn control_current<S: Scalar>(structure: &Structure, m: &Model<S>, inputs: &Inpu
     let (sines, cosines) = three_phase(sin, cos);
     let (current_q, current_d) = park(seen_current(m, structure, s), sines, cosines);
     let supply = link_voltage(m, structure, s, inputs[SUPPLY].at(t) * m.supply_scale);
-    let sample = CurrentSample { reference_d: S::zero(), reference_q: s.current_ref, current_d, current_q, speed, angle, supply };
+    let limits = &m.extra.limits;
+    let reference_d = if structure.limits.direct { limits.reference(s.extra.weakening) } else { S::zero() };
+    let sample = CurrentSample { reference_d, reference_q: s.current_ref, current_d, current_q, speed, angle, supply };
     m.current_control.step(&mut s.current_control, &sample);
+    if structure.limits.weakens {
+        s.extra.weakening = limits.weaken(s.extra.weakening, speed, s.current_control.wanted, supply);
+        limit(m, structure, s);
+    }
     if structure.duty_delay == 0 {
         update_duties(s);
     }

@@ -92,7 +92,7 @@ pub(super) fn demand<S: Scalar, const FULL: bool>(
         let (smooth, jump) = c.jumps.split(&mut s.jumps, change);
         torque = torque + c.derivative_inertia * ((smooth + ahead) * c.per_dt);
         if S::any(!(jump.equals(zero) & s.jumps.level.equals(zero))) {
-            let kick = c.jumps.pass(&mut s.jumps, jump, c.torque_limit, slew(m, x.supply));
+            let kick = c.jumps.pass(&mut s.jumps, jump, s.torque_limit, slew(m, x.supply));
             torque = torque + kick.torque;
             cut = kick.cut;
         }

@@ -104,6 +104,7 @@ impl<F: Form> Wiring for Low<F> {
     }
     fn refresh<S: Scalar>(model: &Model<S>, structure: &Structure, raw: &[S], state: &mut State<S>) {
         state.refresh(raw);
+        model.limit(structure, state);
         model.lubricate(structure, state);
     }
 
@@ -115,9 +116,13 @@ impl<F: Form> Wiring for Low<F> {
         let Event { kind, structure, model: m, state: s, noise, .. } = event;
         match kind {
             TICK_THERMAL => {
-                m.network.tick(&mut s.network);
+                m.network.tick(&mut s.network, s.shaft.work.iron);
                 m.shaft.nut.tick(&mut s.shaft.nut);
                 (s.resistance_factor, s.flux_factor) = m.network.factors(&s.network);
+                if structure.limits.derates {
+                    s.derated = m.limits.derated(s.network.winding);
+                    m.limit(structure, s);
+                }
                 m.lubricate(structure, s);
             }
             TICK_COMMAND_NOISE => s.command_noise = m.control.noise_deviation * noise(0),

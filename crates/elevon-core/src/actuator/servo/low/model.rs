@@ -8,11 +8,13 @@ use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::{Sensed, Sensing};
 use crate::actuator::servo::shaft::{Shaft, ShaftState};
 use crate::control::current_dq::PwmParameter;
+use crate::control::limits::Limits;
 use crate::control::position_speed::{ControlParameter, Mode, PositionLoop};
 use crate::inverter::bridge::{Bridge, BridgeState, InverterParameter};
 use crate::inverter::link::{DcLink, DcLinkState};
 use crate::kept;
 use crate::motor::equivalent::{Circuit, LowParameter};
+use crate::motor::flux_map::FluxMap;
 use crate::motor::pole::WeakPole;
 use crate::motor::star::{MotorParameter, MotorStructure, Star, StarState};
 use crate::motor::thermal::{Network, NetworkState};
@@ -29,6 +31,8 @@ pub struct Model<S> {
     pub dt: S,
     pub star: Star<S>,
     pub pole: WeakPole<S>,
+    pub map: FluxMap<S>,
+    pub limits: Limits<S>,
     pub resistance: [S; 3],
     pub inductance: [S; 3],
     pub healthy: Phase<S>,
@@ -145,6 +149,8 @@ pub struct Phase<S> {
     /// Quadrature component of the imposed currents in the rotor's frame, and as the drive's sensors report it.
     pub quadrature: S,
     pub seen: S,
+    /// Torque of the magnets per quadrature current; the torque constant holds what the currents add to their flux.
+    pub magnets: S,
 }
 
 impl<S: Scalar> Phase<S> {
@@ -164,6 +170,26 @@ impl<S: Scalar> Phase<S> {
             believed: [S::zero(); 2],
             quadrature: one,
             seen: one,
+            magnets: torque_constant,
+        }
+    }
+
+    /// With the flux that the currents (d, q) add to the magnets', and the slope of the quadrature linkage.
+    #[inline(always)]
+    pub(super) fn in_field(&self, m: &Model<S>, [direct, quadrature]: [S; 2]) -> Self {
+        let linked = m.map.at([direct, quadrature]);
+        let across = S::select(quadrature.equals(S::zero()), linked.slope[2], linked.flux[1] / quadrature);
+        let added = S::splat(1.5) * m.star.pole_pairs * (linked.flux[0] - across * direct);
+        let circuit = Circuit::new(self.circuit.resistance, linked.slope[2], m.dt);
+        Self {
+            coefficients: self.coefficients,
+            imposed: self.imposed,
+            direct: self.direct,
+            believed: self.believed,
+            quadrature: self.quadrature,
+            seen: self.seen,
+            magnets: self.torque_constant,
+            ..Self::new(self.torque_constant + added, circuit, &m.control, m.shaft.inertia)
         }
     }
 
@@ -269,13 +295,19 @@ pub struct State<S> {
     pub sensed: Sensed<S>,
     pub filtered: [S; 2],
     pub tripped: S,
+    /// Limit of the torque reference: the controller's, or what derating and a direct current leave of it.
+    pub torque_limit: S,
+    /// Direct current, its part from the field weakening, A; share of the current limit that the temperature leaves.
+    pub direct: S,
+    pub weakening: S,
+    pub derated: S,
     pub shaft: ShaftState<S>,
 }
 
 kept!(State<f64> as State {
     link, resistance_factor, flux_factor, network, command, drawn, copper, current, current_q, current_seen, phases, loops, bridge, driven,
     command_noise, jumps, rested, voltage, integral, filtered_error, speed_ref, torque_ref, motor_torque, sensed, filtered, tripped,
-    shaft
+    torque_limit, direct, weakening, derated, shaft
 });
 
 impl<S: Scalar> Drive<S> {
@@ -376,6 +408,13 @@ impl<S: Scalar> Model<S> {
             circuits,
             star,
             pole: WeakPole::derive(Raw(raw).pole(), raw[MotorParameter::PolePairs.at()]),
+            map: FluxMap::derive(Raw(raw).flux_map(), Raw(raw).motor()),
+            limits: Limits::derive(
+                Raw(raw).limits(),
+                [at(MotorParameter::PolePairs) * raw[PwmParameter::Inductance.at()], raw[PwmParameter::EmfConstant.at()]],
+                raw[ControlParameter::CurrentLimit.at()],
+                dt,
+            ),
             control,
             per_inertia: one / shaft.inertia,
             shaft,
@@ -419,12 +458,26 @@ impl<S: Scalar> Model<S> {
             sensed: self.sensing.start(&shaft),
             filtered: [zero; 2],
             tripped: zero,
+            torque_limit: self.control.torque_limit,
+            direct: zero,
+            weakening: zero,
+            derated: self.limits.derated(warm.winding),
             shaft,
         }
     }
 }
 
 impl<S: Scalar> Model<S> {
+    /// Limit of the torque reference at the present temperature and direct current.
+    #[inline(always)]
+    pub(super) fn limit(&self, structure: &Structure, s: &mut State<S>) {
+        s.torque_limit = self.control.torque_limit;
+        if structure.limits.moves() {
+            let derated = if structure.limits.derates { s.derated } else { S::one() };
+            s.torque_limit = self.control.torque_limit * self.limits.left(derated, self.limits.reference(s.weakening));
+        }
+    }
+
     /// Gives the lubricant the housing's temperature.
     pub(super) fn lubricate(&self, structure: &Structure, s: &mut State<S>) {
         if structure.shaft.lubricated {

@@ -10,9 +10,16 @@ use crate::scalar::{three_phase, Kernel, Scalar};
 use crate::three;
 
 /// What the loads on the shaft decide; what stands behind the own signals is theirs, too.
-const OF_SHAFT: Signals =
-    Signals::of(&[Q::OutputSpeed as usize, Q::FrictionTorque as usize, Q::LoadTorque as usize, Q::StopTorque as usize])
-        .and_from(LOW_SPECIFIC.len());
+const OF_SHAFT: Signals = Signals::of(&[
+    Q::OutputSpeed as usize,
+    Q::FrictionTorque as usize,
+    Q::LoadTorque as usize,
+    Q::StopTorque as usize,
+    Q::HeatIron as usize,
+])
+.and_from(LOW_SPECIFIC.len());
+/// Heat of the present currents takes a sine.
+const OF_COPPER: Signals = Signals::of(&[Q::HeatCopper as usize, Q::HeatPhaseHottest as usize]);
 const OF_INPUTS: Signals = Signals::of(&[Q::BrakeTorque as usize, Q::SupplyVoltage as usize]);
 const SENSORS: [Q; 4] = [Q::EncoderPosition, Q::ResolverPosition, Q::ResolverSpeed, Q::ResolverSignal];
 const OF_SENSORS: Signals = Signals::of(&[SENSORS[0] as usize, SENSORS[1] as usize, SENSORS[2] as usize, SENSORS[3] as usize]);
@@ -23,6 +30,9 @@ impl<S: Scalar> Kernel for Observation<'_, Structure, Model<S>, State<S>, S> {
     fn run(self) {
         let Self { structure, model, inputs, state, t, selection, out } = self;
         states(structure, model, state, out);
+        if selection.any(OF_COPPER) && !structure.heat {
+            [out[Q::HeatCopper as usize], out[Q::HeatPhaseHottest as usize]] = copper_heat(structure, model, state);
+        }
         if selection.any(Signals::of(&[Q::Command as usize])) {
             out[Q::Command as usize] = inputs[COMMAND].at(t) + state.command_noise;
         }
@@ -41,8 +51,7 @@ impl<S: Scalar> Kernel for Observation<'_, Structure, Model<S>, State<S>, S> {
 /// What stands in the state.
 #[inline(always)]
 fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mut [S]) {
-    let [copper, hottest] = copper_heat(structure, m, s);
-    let limited = m.control.speed_limit.le(s.speed_ref.abs()) | m.control.torque_limit.le(s.torque_ref.abs());
+    let limited = m.control.speed_limit.le(s.speed_ref.abs()) | s.torque_limit.le(s.torque_ref.abs());
     for (q, value) in [
         (Q::OutputPosition, s.shaft.output_position),
         (Q::MotorPosition, s.shaft.motor_position),
@@ -59,8 +68,8 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
         (Q::WindingTemperatureHottest, if structure.heat { m.network.hottest(&s.network) } else { m.temperature }),
         (Q::SurfaceTemperature, m.network.housing(structure.heat, &s.network)),
         (Q::AmbientTemperature, m.network.air()),
-        (Q::HeatPhaseHottest, if structure.heat { s.network.hottest } else { hottest }),
-        (Q::HeatCopper, if structure.heat { s.network.power[0] } else { copper }),
+        (Q::HeatPhaseHottest, s.network.hottest),
+        (Q::HeatCopper, s.network.power[0]),
         (Q::HeatAir, s.network.power[3]),
         (Q::ThermalWarning, m.network.warns(&s.network)),
         (Q::Limited, S::indicator(limited)),
@@ -71,6 +80,7 @@ fn states<S: Scalar>(structure: &Structure, m: &Model<S>, s: &State<S>, out: &mu
         (Q::EnergyCopper, s.copper),
         (Q::EnergyHeatStored, m.network.stored(&s.network)),
         (Q::EnergyAir, s.network.heat_out),
+        (Q::EnergyIron, s.shaft.work.iron),
     ] {
         out[q as usize] = value;
     }
@@ -101,6 +111,7 @@ fn loaded<S: Scalar>(structure: &Structure, m: &Model<S>, x: &Instant<S>, s: &St
         (Q::BrakeTorque, x.brake),
         (Q::LoadTorque, signals.load),
         (Q::StopTorque, signals.stop),
+        (Q::HeatIron, signals.iron),
         (Q::SupplyVoltage, if structure.link { m.drive.link.voltage(&s.link, source) } else { source }),
     ] {
         out[q as usize] = value;

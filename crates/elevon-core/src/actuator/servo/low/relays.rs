@@ -30,18 +30,18 @@ pub(super) fn mean_error<S: Scalar>(m: &Model<S>, s: &State<S>, p: &Phase<S>, su
 }
 
 /// The shaft as it is pushed. No closure: one is compiled by itself, without the vector instructions of its caller.
-struct Pushed<'a, S, const EXTRA: bool> {
+struct Pushed<'a, S, const FULL: bool, const EXTRA: bool> {
     m: &'a Model<S>,
     structure: &'a Structure,
     s: &'a State<S>,
     loads: &'a Loads<S>,
 }
 
-impl<S: Scalar, const EXTRA: bool> Pushed<'_, S, EXTRA> {
+impl<S: Scalar, const FULL: bool, const EXTRA: bool> Pushed<'_, S, FULL, EXTRA> {
     /// Acceleration by a torque, with one over an inertia.
     #[inline(always)]
     fn torque(&self, torque: S, per_inertia: S) -> S {
-        self.m.shaft.acceleration::<EXTRA>(&self.structure.shaft, &self.s.shaft, self.loads, torque, per_inertia)
+        self.m.shaft.acceleration::<FULL, EXTRA>(&self.structure.shaft, &self.s.shaft, self.loads, torque, per_inertia)
     }
 }
 
@@ -56,7 +56,7 @@ pub(super) struct TorqueDemand<S> {
 /// Acceleration under the torque that the relays leave anywhere within `band` of a current reference that contains the
 /// acceleration: T_ref = A - D a, J a = clamp(T_drift, eta T_ref +- b) - L. Monotone and piecewise linear in a.
 #[inline(always)]
-pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
+pub(super) fn within_band<S: Scalar, const FULL: bool, const EXTRA: bool>(
     m: &Model<S>,
     structure: &Structure,
     s: &State<S>,
@@ -65,7 +65,7 @@ pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
     band: S,
     loads: &Loads<S>,
 ) -> S {
-    let by = Pushed::<S, EXTRA> { m, structure, s, loads };
+    let by = Pushed::<S, FULL, EXTRA> { m, structure, s, loads };
     let emf = S::splat(2.0 / 3.0) * p.torque_constant * s.shaft.motor_speed;
     let drift = p.torque_constant * p.circuit.current(s.current, -emf);
     let band = p.torque_constant * band;
@@ -74,9 +74,9 @@ pub(super) fn within_band<S: Scalar, const EXTRA: bool>(
     let push = gap.signed(band);
     let mut edge = by.torque(p.efficacy.fma(demand.torque, push), demand.per_inertia);
     let reference = demand.torque - demand.inertia * edge;
-    let limited = m.control.torque_limit.lt(reference.abs());
+    let limited = s.torque_limit.lt(reference.abs());
     if S::any(limited) {
-        let limit = by.torque(p.efficacy.fma(reference.clamp_abs(m.control.torque_limit), push), demand.per_shaft);
+        let limit = by.torque(p.efficacy.fma(reference.clamp_abs(s.torque_limit), push), demand.per_shaft);
         edge = S::select(limited, limit, edge);
     }
     S::select(gap.abs().le(band), coasting, edge)

@@ -35,7 +35,11 @@ fn supply<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, x: 
 fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structure, supply: &Supply<S>, s: &mut State<S>, p: &Phase<S>) {
     let Supply { source, link: supply, band } = *supply;
     let speed = s.shaft.motor_speed;
-    let mut emf = S::splat(2.0 / 3.0) * p.torque_constant * speed;
+    let mut emf = S::splat(2.0 / 3.0) * p.magnets * speed;
+    let field = if EXTRA && structure.field { Field::of(m, structure, s) } else { Field::none() };
+    if EXTRA && structure.field {
+        emf = emf + m.star.pole_pairs * speed * field.linked[0];
+    }
     if EXTRA && structure.loops {
         emf = emf + m.circuits.voltage(s, p);
     }
@@ -50,6 +54,9 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     };
     let driving = circuit.voltage(s.current, target);
     let mut cross = m.drive.electrical_inductance * speed * s.current;
+    if EXTRA && structure.field {
+        cross = m.star.pole_pairs * speed * field.linked[1] - p.circuit.resistance * s.direct;
+    }
     if EXTRA && structure.angle {
         cross = cross - p.direct * speed;
     }
@@ -59,6 +66,7 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     let margin = largest * largest - cross * cross;
     s.voltage = driving + emf;
     let limited = margin.lt(s.voltage * s.voltage);
+    let wanted = s.voltage;
     let mut reached = target;
     if S::any(limited) {
         let clamped = s.voltage.clamp_abs(margin.maximum(S::zero()).sqrt());
@@ -75,6 +83,11 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
     let mut loss = S::splat(1.5) * middle * middle * p.circuit.resistance;
     // Terminal power of the three phases, 3/2 v_q i_q.
     let mut power = S::splat(1.5) * s.voltage * middle;
+    if EXTRA && structure.field {
+        s.motor_torque = p.magnets * reached + m.map.torque([field.direct, reached]);
+        let [heat, drawn] = field.settle(m, structure, s, p, [wanted, cross, supply]);
+        (loss, power) = (loss + heat, power + drawn);
+    }
     let mut windings = if EXTRA && structure.heat { of_phases(m, structure, s, p, middle) } else { [S::zero(); 3] };
     let phases = s.phases;
     if EXTRA && structure.angle {
@@ -124,6 +137,46 @@ fn electric_step<S: Scalar, const EXTRA: bool>(m: &Model<S>, structure: &Structu
         s.network.windings = three!(|j| m.dt.fma(windings[j], s.network.windings[j]));
         s.copper = s.copper + heat;
         s.drawn = m.dt.fma(power, s.drawn);
+    }
+}
+
+/// The direct current of a step and what the currents before it link.
+struct Field<S> {
+    direct: S,
+    linked: [S; 2],
+}
+
+impl<S: Scalar> Field<S> {
+    #[inline(always)]
+    fn none() -> Self {
+        Self { direct: S::zero(), linked: [S::zero(); 2] }
+    }
+
+    #[inline(always)]
+    fn of(m: &Model<S>, structure: &Structure, s: &State<S>) -> Self {
+        let reference = if structure.limits.direct { m.limits.reference(s.weakening) } else { S::zero() };
+        let direct = m.drive.tracking.fma(reference - s.direct, s.direct);
+        Self { direct, linked: m.map.at([s.direct, s.current]).flux }
+    }
+
+    /// Steps the direct current and its reference; copper loss and power of the direct axis in the step. `wanted` is the quadrature
+    /// voltage that the current controller asks for, `cross` less the direct one at rest.
+    #[inline(always)]
+    fn settle(&self, m: &Model<S>, structure: &Structure, s: &mut State<S>, p: &Phase<S>, [wanted, cross, supply]: [S; 3]) -> [S; 2] {
+        let half = S::splat(0.5);
+        let middle = half * (s.direct + self.direct);
+        let after = m.map.at([self.direct, s.current]).flux;
+        let changing = (after[0] - self.linked[0]) / m.dt;
+        let turning = m.star.pole_pairs * s.shaft.motor_speed * half * (after[1] + self.linked[1]);
+        let loss = S::splat(1.5) * p.circuit.resistance * middle * middle;
+        let power = loss + S::splat(1.5) * (changing - turning) * middle;
+        if structure.limits.weakens {
+            let size = (wanted * wanted + cross * cross).sqrt();
+            s.weakening = m.limits.weaken(s.weakening, s.shaft.motor_speed, size, supply);
+            m.limit(structure, s);
+        }
+        s.direct = self.direct;
+        [loss, power]
     }
 }
 
@@ -241,6 +294,13 @@ fn step_with<S: Scalar, const FULL: bool, const EXTRA: bool, const SATURATED: bo
     } else {
         p
     };
+    let in_field;
+    let p = if EXTRA && structure.field {
+        in_field = p.in_field(m, [s.direct, s.current]);
+        &in_field
+    } else {
+        p
+    };
     let (mut derivative_inertia, mut per_inertia) = (m.control.derivative_inertia, p.per_effective_inertia);
     let (mut shaft_inertia, mut per_shaft) = (m.shaft.inertia, m.per_inertia);
     if FULL && structure.shaft.flanks {
@@ -276,16 +336,16 @@ fn step_with<S: Scalar, const FULL: bool, const EXTRA: bool, const SATURATED: bo
     let three = EXTRA && structure.driven;
     let mut acceleration = S::zero();
     if three || !relays {
-        acceleration = m.shaft.acceleration::<EXTRA>(&structure.shaft, &s.shaft, felt, torque, per_inertia);
+        acceleration = m.shaft.acceleration::<FULL, EXTRA>(&structure.shaft, &s.shaft, felt, torque, per_inertia);
     }
     if relays && (!three || structure.gradual) {
         let per_inertia = if three { S::one() / p.efficacy.fma(derivative_inertia, shaft_inertia) } else { per_inertia };
         let demand = TorqueDemand { torque: demand.torque, inertia: derivative_inertia, per_inertia, per_shaft };
-        let one = within_band::<S, EXTRA>(m, structure, s, p, &demand, supply.band, felt);
+        let one = within_band::<S, FULL, EXTRA>(m, structure, s, p, &demand, supply.band, felt);
         acceleration = if three { m.drive.share(one, acceleration) } else { one };
     }
     let unlimited = demand.torque - derivative_inertia * acceleration;
-    s.torque_ref = unlimited.clamp_abs(m.control.torque_limit);
+    s.torque_ref = unlimited.clamp_abs(s.torque_limit);
     integrate(m, structure, s, &demand, unlimited);
 
     // Equivalent phase, motor and transmission dynamics.

@@ -5,10 +5,12 @@ use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::actuator::servo::sensing::SensingDetails;
 use crate::actuator::servo::shaft::{ShaftDetails, ShaftNeeds};
+use crate::control::limits::LimitStructure;
 use crate::control::position_speed::{ControlParameter, ControlStructure};
 use crate::details;
 use crate::inverter::bridge::BridgeStructure;
 use crate::inverter::link::DcLink;
+use crate::motor::flux_map::FluxMap;
 use crate::motor::pole::WeakPole;
 use crate::motor::star::{interrupted, MotorParameter, MotorStructure, ShortModel};
 use crate::motor::thermal::Network;
@@ -24,6 +26,7 @@ details! {
         /// The references are blocks, not sines.
         six_step: bool = Commutation::read(parts.drive().value(DriveParameter::Commutation)) == Commutation::SixStep;
         control: ControlStructure = ControlStructure::read(&parts.control());
+        limits: LimitStructure = LimitStructure::read(&parts.limits(), drive == DriveKind::Pwm, Network::<f64>::needed(&parts.thermal()));
         integral: bool = parts.control().used(if control.pid { ControlParameter::PidIntegralTime } else { ControlParameter::IntegralTime });
         /// The command carries noise.
         noisy_command: bool = parts.control().used(ControlParameter::NoiseDeviation);
@@ -77,6 +80,8 @@ details! {
         /// The references stand apart from the rotor by an angle that does not change.
         turned = misled && parts.resolver().away(ResolverParameter::Offset);
         heat = Network::<f64>::needed(&parts.thermal());
+        /// The phase has a direct current, or linkages other than L i.
+        field = limits.direct || FluxMap::<f64>::needed(&parts.flux_map());
         /// Electrical energies are recorded.
         accounts = records(parts, F::LOW, "energy");
         link = DcLink::<f64>::needed(&parts.link());

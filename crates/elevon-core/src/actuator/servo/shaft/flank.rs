@@ -96,7 +96,7 @@ impl<S: Scalar> Shaft<S> {
         let mut alone = *s;
         alone.flank = Flank { side: zero, acting: one, ..s.flank };
         let loads = self.loads::<true, EXTRA>(d, x, &alone, torque);
-        let motor = self.acceleration::<EXTRA>(d, &alone, &loads, torque, S::one() / self.rotor_inertia) * self.gear.per_ratio;
+        let motor = self.acceleration::<true, EXTRA>(d, &alone, &loads, torque, S::one() / self.rotor_inertia) * self.gear.per_ratio;
         let speed = s.motor_speed * self.gear.per_ratio;
         let output = (self.free_output(d, speed, force, friction).speed - speed) / self.dt;
         let parts = ((motor - output) * side).lt(zero);

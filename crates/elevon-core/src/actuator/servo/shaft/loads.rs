@@ -24,6 +24,8 @@ pub(in crate::actuator::servo) struct Loads<S> {
     pub(super) viscous: S,
     /// Friction in the nut of a screw.
     pub(super) nut: S,
+    /// Drag of the motor's iron, in the dry friction.
+    pub(super) iron: S,
     /// All that opposes the motion at the present speed.
     pub(super) resist: S,
 }
@@ -106,6 +108,7 @@ impl<S: Scalar> Shaft<S> {
             limits = [limits[0] * s.lubricant.dry, limits[1] * s.lubricant.dry];
         }
         let (mut static_limit, mut dynamic) = (limits[0] + added, limits[1] + added);
+        let mut iron = S::zero();
         if EXTRA {
             if d.preloaded {
                 let mut preload = self.screw.preload_torque * self.screw.relieved(carried);
@@ -124,11 +127,15 @@ impl<S: Scalar> Shaft<S> {
                 dynamic = dynamic * s.scatter;
                 nut = nut * s.scatter;
             }
+            if d.train.iron {
+                iron = self.train.iron.drag(s.motor_speed);
+                (static_limit, dynamic) = (static_limit + iron, dynamic + iron);
+            }
         }
         let speed = s.motor_speed;
         let viscous = self.viscous::<FULL, EXTRA>(d, s);
         let resist = load + speed.signed(dynamic) + viscous;
-        Loads { brake, output_torque, load, motor_side, through, delivered, meshes, static_limit, dynamic, viscous, nut, resist }
+        Loads { brake, output_torque, load, motor_side, through, delivered, meshes, static_limit, dynamic, viscous, nut, iron, resist }
     }
 
     #[inline(always)]

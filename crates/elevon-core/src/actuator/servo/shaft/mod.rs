@@ -205,9 +205,11 @@ pub struct Work<S> {
     pub load: S,
     /// Lost at the stops and in the contact.
     pub impact: S,
+    /// Heat of the motor's iron.
+    pub iron: S,
 }
 
-kept!(Work<f64> as Work { friction, brake, load, impact });
+kept!(Work<f64> as Work { friction, brake, load, impact, iron });
 
 impl<S: Scalar> Shaft<S> {
     pub(super) fn derive<F: Form>(raw: &[S], d: &ShaftDetails, dt: S) -> Self {
@@ -281,7 +283,7 @@ impl<S: Scalar> Shaft<S> {
             vibration: VibrationState::initial(),
             flank: Flank::at(driver - output_position, self.backlash.half),
             bodies: Bodies::with(motor_position, or(motor[1], zero), self.gear_train.turns),
-            work: Work { friction: zero, brake: zero, load: zero, impact: zero },
+            work: Work { friction: zero, brake: zero, load: zero, impact: zero, iron: zero },
         }
     }
 }

@@ -17,6 +17,8 @@ pub(in crate::actuator::servo) struct ShaftSignals<S> {
     pub output_torque: S,
     pub through: S,
     pub unbalance: S,
+    /// Loss of the motor's iron, W.
+    pub iron: S,
     pub added: Added<S>,
     /// Torque on the motor shaft that an end stop cancels.
     pub stop: S,
@@ -38,6 +40,7 @@ impl<S: Scalar> Shaft<S> {
             output_torque: loads.output_torque,
             through: loads.delivered,
             unbalance: if d.unbalance { self.unbalance.torque(s.motor_position) } else { S::zero() },
+            iron: loads.iron * s.motor_speed.abs(),
             added: self.train.added(&d.train, s.motor_position, [loads.through, loads.delivered], self.gear.per_ratio),
             stop: self.stopped(d, x, s, &loads, torque - loads.load - dry),
             meshes: loads.meshes,

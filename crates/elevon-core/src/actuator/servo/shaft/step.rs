@@ -10,7 +10,7 @@ use crate::transmission::friction_law::{Moved, Push};
 impl<S: Scalar> Shaft<S> {
     /// Acceleration of a shaft of the inertia 1/`per_inertia` under the motor's `torque`.
     #[inline(always)]
-    pub(in crate::actuator::servo) fn acceleration<const EXTRA: bool>(
+    pub(in crate::actuator::servo) fn acceleration<const FULL: bool, const EXTRA: bool>(
         &self,
         d: &ShaftDetails,
         s: &ShaftState<S>,
@@ -21,18 +21,18 @@ impl<S: Scalar> Shaft<S> {
         if EXTRA && d.train.law.bristles() {
             return (self.on_bristles(d, s, loads, torque, self.dt * per_inertia).speed - s.motor_speed) / self.dt;
         }
-        self.net(d, s, loads, torque) * per_inertia
+        self.net::<FULL>(d, s, loads, torque) * per_inertia
     }
 
     /// Torque left to accelerate under the motor's `torque`, by friction and a stop that it stands at.
     #[inline(always)]
-    fn net(&self, d: &ShaftDetails, s: &ShaftState<S>, loads: &Loads<S>, torque: S) -> S {
+    fn net<const FULL: bool>(&self, d: &ShaftDetails, s: &ShaftState<S>, loads: &Loads<S>, torque: S) -> S {
         let speed = s.motor_speed;
         let net = Friction::net_torque(torque, loads.load, loads.resist, speed, loads.static_limit);
-        if d.elastic {
+        if FULL && d.elastic {
             return net;
         }
-        if d.buffered {
+        if FULL && d.buffered {
             let stop = self.gear.motor_stop.force(s.motor_position, speed);
             return Friction::net_torque(torque, loads.load + stop, loads.resist + stop, speed, loads.static_limit);
         }
@@ -87,7 +87,7 @@ impl<S: Scalar> Shaft<S> {
             s.bristle = moved.bristle;
             return (moved.speed, Some(moved.dry));
         }
-        let mut net = self.net(d, s, loads, torque);
+        let mut net = self.net::<FULL>(d, s, loads, torque);
         if FULL && d.buffered && !d.elastic {
             // The stop has a step of its own.
             net = net + self.gear.motor_stop.force(s.motor_position, s.motor_speed);
@@ -110,9 +110,9 @@ impl<S: Scalar> Shaft<S> {
         let (new_speed, on_bristles) = self.new_speed::<FULL, EXTRA>(d, s, loads, torque);
         let moved = self.dt.fma(self.advancing(d, speed, new_speed), s.motor_position);
         let (position, end_speed) = self.at_stop::<FULL>(d, s, new_speed, moved);
-        if FULL && d.accounts {
+        if FULL && (d.accounts || EXTRA && d.train.iron) {
             let dry = on_bristles.unwrap_or_else(|| Friction::dry_torque(torque - loads.load, speed, loads.static_limit, loads.dynamic));
-            self.account(d, s, loads, [speed, new_speed, end_speed], dry);
+            self.account::<EXTRA>(d, s, loads, [speed, new_speed, end_speed], dry);
         }
         if EXTRA && d.nut {
             s.nut.collected = s.nut.collected + self.dt * self.nut.share * loads.nut * speed.abs();
@@ -212,11 +212,17 @@ impl<S: Scalar> Shaft<S> {
 
     /// Work of a step at its middle; `speeds` before, after and as the stops leave it.
     #[inline(always)]
-    fn account(&self, d: &ShaftDetails, s: &mut ShaftState<S>, loads: &Loads<S>, [old, new, end_speed]: [S; 3], dry: S) {
+    fn account<const EXTRA: bool>(&self, d: &ShaftDetails, s: &mut ShaftState<S>, loads: &Loads<S>, [old, new, end_speed]: [S; 3], dry: S) {
         let half = S::splat(0.5);
         let middle = half * (old + new);
         // The brake takes its share of the dry friction.
-        let share = loads.brake / loads.dynamic.maximum(S::splat(1e-300));
+        let whole = loads.dynamic.maximum(S::splat(1e-300));
+        let share = loads.brake / whole;
+        if EXTRA && d.train.iron {
+            let iron = dry * (loads.iron / whole);
+            s.work.iron = s.work.iron + self.dt * iron * middle;
+            s.work.friction = s.work.friction - self.dt * iron * middle;
+        }
         s.work.brake = s.work.brake + self.dt * (dry * share) * middle;
         s.work.friction = s.work.friction + self.dt * (dry * (S::one() - share) + loads.viscous) * middle;
         s.work.load = s.work.load + self.dt * loads.motor_side * middle;

@@ -4,6 +4,7 @@
 use crate::actuator::servo::form::Form;
 use crate::actuator::servo::layout::*;
 use crate::motor::cogging::Cogging;
+use crate::motor::iron_loss::IronLoss;
 use crate::motor::magnetic_pull::{Eccentricity, MagneticPull};
 use crate::motor::rub::Rub;
 use crate::motor::star::MotorParameter;
@@ -26,6 +27,7 @@ details! {
         /// Another law than Borello's.
         lawful = law != FrictionLaw::Borello;
         cogging = Cogging::<f64>::needed(&parts.cogging());
+        iron = IronLoss::<f64>::needed(&parts.iron_loss());
         /// An eccentric rotor is pulled.
         pull = MagneticPull::<f64>::needed(&parts.magnetic_pull())
             && (parts.motor().any_away([MotorParameter::EccentricityStatic, MotorParameter::EccentricityDynamic])
@@ -41,6 +43,7 @@ details! {
 pub struct Train<S> {
     pub law: Law<S>,
     cogging: Cogging<S>,
+    pub iron: IronLoss<S>,
     bearing: Bearing<S>,
     eccentricity: Eccentricity<S>,
     pull: MagneticPull<S>,
@@ -100,6 +103,7 @@ impl<S: Scalar> Train<S> {
         Self {
             law: Law::derive(view.friction_law(), raw[FrictionParameter::DryScale.at()]),
             cogging: Cogging::derive(view.cogging()),
+            iron: IronLoss::derive(view.iron_loss(), view.motor()),
             bearing: Bearing::derive(view.bearing()),
             eccentricity: Eccentricity::new(at(MotorParameter::EccentricityStatic), turning),
             pull: MagneticPull::derive(view.magnetic_pull()),
