@@ -33,6 +33,7 @@ from elevon.scenario import Scenario as Scenario
 from elevon.session import Fmu as Fmu
 from elevon.session import Session as Session
 from elevon.simulate import Run as Run
+from elevon.simulate import prepare as prepare
 from elevon.simulate import simulate as simulate
 from elevon.simulate import simulate_batch as simulate_batch
 

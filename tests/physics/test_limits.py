@@ -67,6 +67,35 @@ def test_at_the_voltage_limit_no_direct_current_takes_the_voltage(
         assert abs(late(rec, "current_d")) < 1e-2
 
 
+@FIDELITIES
+@pytest.mark.parametrize(
+    ("supply", "load", "speed"), [(380.0, 0.0, 239.7), (380.0, 1.0, 234.0), (228.0, 0.0, 144.0)]
+)
+def test_the_bench_at_its_voltage_limit(
+    fidelity: str, supply: float, load: float, speed: float
+) -> None:
+    """The shipped set, stops away, a step to 250 rad/s: what voltage and friction leave."""
+    values = {
+        "drive.kind": "pwm",
+        "stop.upper": 1e6,
+        "stop.lower": -1e6,
+        "control.speed_limit": 1000.0,
+        "inverter.supply_voltage": supply,
+    }
+    rec = elevon.simulate(
+        elevon.Actuator.load("torino-rotary").with_values(values, request=False),
+        make_scenario(
+            duration=2.0,
+            mode="speed",
+            command=[term("step", final=250.0, time=0.0)],
+            extra={"load": {"shaft": {"terms": [constant(load)]}}},
+        ),
+        fidelity=fidelity,
+        record="motor_speed@2 kHz",
+    )
+    assert late(rec, "motor_speed") == pytest.approx(speed, rel=2e-3)
+
+
 @pytest.mark.parametrize("drive", [PWM, HYSTERESIS])
 def test_an_open_phase_has_its_emf_in_the_quadrature_voltage(drive: dict[str, Any]) -> None:
     """Phase-to-neutral voltages, the open one's too: R i_q + k w + p w L i_d in the mean."""

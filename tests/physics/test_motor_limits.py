@@ -151,7 +151,7 @@ def weakened(supply: float, load: float, speed: float, share: float = 0.95) -> f
         v_d = R * i_d - P * speed * L * i_q
         return math.hypot(v_q, v_d) - share * supply / math.sqrt(3)
 
-    return float(brentq(room, -15.0, 0.0))
+    return float(brentq(room, -K / (P * L), 0.0))
 
 
 WEAKENED = {
@@ -197,7 +197,7 @@ def test_field_weakening_ends_at_its_current(fidelity: str) -> None:
     values = WEAKENED | {"control.field_weakening_current": 4.0}
     rec = run(
         FREE_SHAFT | PWM | values,
-        duration=2.0,
+        duration=4.0,
         mode="speed",
         command=[constant(900.0)],
         scenario={"load": {"shaft": {"terms": [constant(1.0)]}}},

@@ -187,7 +187,7 @@ def _simulated(
         share = _share(progress, done, len(group), len(runs))
         clocks: dict[tuple[str, float, int], Clock] = {}
         for index, result in zip(
-            group, _run_core(part, fidelity, threads, lanes, share), strict=True
+            group, run_core(part, fidelity, threads, lanes, share), strict=True
         ):
             results[index] = build_recording(runs[index], prepared[index], fidelity, result, clocks)
         done += len(group)
@@ -213,7 +213,7 @@ def simulate_prepared(
         share = _share(progress, done, len(group), len(prepared))
         part = [prepared[index] for index in group]
         for index, result in zip(
-            group, _run_core(part, fidelity, threads, lanes, share), strict=True
+            group, run_core(part, fidelity, threads, lanes, share), strict=True
         ):
             results[index] = result
         done += len(group)
@@ -275,13 +275,14 @@ def _share(progress: Progress | None, done: int, part: int, total: int) -> Calla
     return report
 
 
-def _run_core(
+def run_core(
     part: Sequence[Prepared],
     fidelity: str,
     threads: int | None,
     lanes: str,
     progress: Callable[[float], bool],
 ) -> list[CoreResult]:
+    """Run what is ready for the core, of one wiring and plan; errors as `simulate_batch`."""
     from elevon import _core
 
     first = part[0]
