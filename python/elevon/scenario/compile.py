@@ -214,9 +214,10 @@ def _table(term: Term, port_unit: str, place: str) -> tuple[Points, Points]:
     if term.kind != TABLE:
         return (), ()
     times, values = term.points()
-    check_kind(term.unit or port_unit, port_unit, f"{place}: unit")
+    given = "V" if term.standard is not None else term.unit
+    check_kind(given or port_unit, port_unit, f"{place}: unit")
     check_kind(term.time_unit, "s", f"{place}: time_unit")
-    return to_si(times, term.time_unit), to_si(values, term.unit or port_unit)
+    return to_si(times, term.time_unit), to_si(values, given or port_unit)
 
 
 def _initial(scenario: Scenario, wiring: str, fidelity: str) -> dict[str, float]:

@@ -25,6 +25,7 @@ from elevon.arrays import Floats
 from elevon.documents import Document, read_toml, validated
 from elevon.errors import InputError, UnitError, did_you_mean
 from elevon.faults import Fault
+from elevon.loads.power_quality import supply_transient
 from elevon.report.cards import Html, card, table
 from elevon.series import check_series, read_series
 from elevon.strict import Quantity, Strict
@@ -169,7 +170,9 @@ def _sum(terms: Terms) -> str:
 
 def _term(term: Term) -> str:
     given: dict[str, object] = dict(term.arguments)
-    if term.file is not None:
+    if term.standard is not None:
+        given["standard"] = term.standard
+    elif term.file is not None:
         given["file"] = term.file
     elif term.times is not None:
         given["points"] = len(term.times)
@@ -187,7 +190,9 @@ class Term(BaseModel):
         A switch; a disabled term adds nothing.
     times, values : tuple of float
         Points of a table, in `time_unit` and `unit`; instead of them `file`, a CSV file of two
-        columns.
+        columns, or `standard`.
+    standard : str
+        A supply's transient by its standard, such as ``mil-std-704f/28v/overvoltage``; V over s.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
@@ -198,6 +203,7 @@ class Term(BaseModel):
     times: tuple[StrictInt | StrictFloat, ...] | None = None
     values: tuple[StrictInt | StrictFloat, ...] | None = None
     file: StrictStr | None = None
+    standard: StrictStr | None = None
     unit: StrictStr = ""
     time_unit: StrictStr = "s"
 
@@ -207,7 +213,8 @@ class Term(BaseModel):
         if self.kind not in known:
             raise ValueError(f"unknown waveform {self.kind!r}{did_you_mean(self.kind, known)}")
         record = known[self.kind]
-        points = ["times", "values", "file", "unit", "time_unit"] if self.kind == TABLE else []
+        own = ["times", "values", "file", "standard", "unit", "time_unit"]
+        points = own if self.kind == TABLE else []
         valid = ["kind", "enabled", *record.names, *points]
         for name in (*self.arguments, *(self.model_fields_set - {"kind", "enabled"})):
             if name not in valid:
@@ -229,14 +236,19 @@ class Term(BaseModel):
 
     def points(self) -> tuple[Floats, Floats]:
         """Return times and values of a table as given, shape (n,) each, from the file if any."""
+        if self.standard is not None:
+            return supply_transient(self.standard).points()
         if self.file is not None:
             return check_series(*read_series(self.file, "table"), f"table {self.file}")
         return check_series(self.times or (), self.values or (), "table")
 
     def _check_points(self) -> None:
         inline = self.times is not None or self.values is not None
-        if inline == (self.file is not None):
-            raise ValueError("a table needs either 'times' and 'values' or a 'file'")
+        given = [inline, self.file is not None, self.standard is not None]
+        if sum(given) != 1:
+            raise ValueError("a table needs either 'times' and 'values', a 'file' or a 'standard'")
+        if self.standard is not None and self.model_fields_set & {"unit", "time_unit"}:
+            raise ValueError("a table of a 'standard' has its own units, V and s")
         try:
             self.points()
         except InputError as error:
