@@ -245,6 +245,16 @@ impl<S: Scalar> Constants<S> {
         Acting { motor_torque, output: inputs[OUTPUT].at(t), brake_free: s.brake_free, released: s.released, rig_speed: inputs[RIG].at(t) }
     }
 
+    /// The motor turns on for a step from `t`, and the Hall sensors see where it has come.
+    #[inline(always)]
+    pub fn turn(&self, body: &mut Body<S>, t: S) {
+        let before = body.motion.motor_position;
+        self.mechanics.drift(&mut body.motion, self.dt);
+        let angle = self.star.electrical_angle(body.motion.motor_position);
+        let advance = (body.motion.motor_position - before) * self.star.pole_pairs;
+        self.hall.observe(&mut body.hall, angle, advance, t + self.dt, self.dt);
+    }
+
     /// The link after a step in which the bridge drew `bus` from it.
     #[inline(always)]
     pub fn feed(&self, s: &mut Body<S>, source: S, bus: S, accounts: bool) {

@@ -162,11 +162,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     let t = S::splat(k as f64) * m.c.dt;
     let source = m.c.source(inputs, t);
     electric(m, structure, s, source, t);
-    let before = s.body.motion.motor_position;
-    m.c.mechanics.drift(&mut s.body.motion, m.c.dt);
-    let angle = m.c.star.electrical_angle(s.body.motion.motor_position);
-    let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
-    m.c.hall.observe(&mut s.body.hall, angle, advance, t + m.c.dt, m.c.dt);
+    m.c.turn(&mut s.body, t);
     if (k + 1).is_multiple_of(m.mechanical) {
         let torque = s.torque * m.per_torque_steps;
         let acting = m.c.acting(&s.body, inputs, torque, t);

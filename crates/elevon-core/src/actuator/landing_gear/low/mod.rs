@@ -114,11 +114,7 @@ fn step<S: Scalar>(m: &Model<S>, structure: &Structure, inputs: &Inputs<S>, s: &
     m.c.feed(&mut s.body, source, bus, structure.accounts);
     let acting = m.c.acting(&s.body, inputs, s.torque, t);
     m.c.mechanics.kick(&mut s.body.motion, &acting, structure.rig);
-    let before = s.body.motion.motor_position;
-    m.c.mechanics.drift(&mut s.body.motion, dt);
-    let angle = m.c.star.electrical_angle(s.body.motion.motor_position);
-    let advance = (s.body.motion.motor_position - before) * m.c.star.pole_pairs;
-    m.c.hall.observe(&mut s.body.hall, angle, advance, t + dt, dt);
+    m.c.turn(&mut s.body, t);
     hand_over(s);
 }
 
