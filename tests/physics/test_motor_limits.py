@@ -50,8 +50,8 @@ def linkage(
     """Flux of both axes without the magnets', written from the coenergy's definition."""
     size, bias = (8.0, 3.0) if saturated else (math.inf, 0.0)
     bend = 1 / math.sqrt(1 + (i_q**2 + saliency * (i_d + bias) ** 2) / size**2)
-    rest = 1 / math.sqrt(1 + saliency * bias**2 / size**2)
-    return saliency * L * (bend * (i_d + bias) - rest * bias), L * bend * i_q
+    at_zero = 1 / math.sqrt(1 + saliency * bias**2 / size**2)
+    return saliency * L * (bend * (i_d + bias) - at_zero * bias), L * bend * i_q
 
 
 def torque(i_d: float, i_q: float, **map_: Any) -> float:

@@ -213,8 +213,8 @@ class Term(BaseModel):
         if self.kind not in known:
             raise ValueError(f"unknown waveform {self.kind!r}{did_you_mean(self.kind, known)}")
         record = known[self.kind]
-        own = ["times", "values", "file", "standard", "unit", "time_unit"]
-        points = own if self.kind == TABLE else []
+        table_keys = ["times", "values", "file", "standard", "unit", "time_unit"]
+        points = table_keys if self.kind == TABLE else []
         valid = ["kind", "enabled", *record.names, *points]
         for name in (*self.arguments, *(self.model_fields_set - {"kind", "enabled"})):
             if name not in valid:
