@@ -15,7 +15,8 @@ from elevon.logs.formats.drive import write_drive_csv
 from elevon.logs.formats.table import RawTable
 from elevon.logs.importing import import_log
 from elevon.logs.maps.agreement import lag_of
-from elevon.logs.maps.guess import guess_map, role_hint, unit_hint
+from elevon.logs.maps.guess import guess_map
+from elevon.logs.maps.headers import role_hint, unit_hint
 from elevon.logs.read import imported_log, read_log
 
 LEAD = 5e-3  # m for one turn

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elevon.arrays import Floats
+from elevon.arrays import Bools, Floats
 from elevon.diagnose.engine.candidates import of_a_magnet
 from elevon.diagnose.roles.numbers import lines
 from elevon.diagnose.roles.reading import BEFORE, INPUTS, RoleReading, read_load
@@ -25,6 +25,8 @@ _FASTEST = 1000.0  # Hz; faster logs are averaged down: the reduced-order model 
 _LONGEST = 60.0  # s after the onset that are read
 _LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
 _EXACT = 2e-4  # of the command's range: what straight lines may miss
+_LONG_GAP = 0.02  # s: over a shorter one the command is as good as known
+_SETTLES = 0.3  # s after a longer gap that do not count. ASSUMED: three lags of a slow loop
 _QUIET = 1e-3  # of the command's range: below it nothing is commanded
 
 
@@ -86,9 +88,30 @@ def aligned(
     findings = [f"{name}: too many samples missing, left out: {', '.join(lost)}"] if lost else []
     if until is None and time[-1] - first > _LONGEST * (1.0 + _LADDER):
         findings.append(f"{name}: read up to {_LONGEST:g} s after the first command")
-    good = np.ones(len(clock), dtype=np.bool_)
+    good = _there(raw, clock + begin)
+    channels = {
+        r: v if r == "command" else bridged(clock, np.where(good, v, np.nan), log.units[r])
+        for r, v in channels.items()
+    }
     ready = replace(log, time=clock, channels=channels, good=good, recording=None, start=begin)
     return ready, seconds, findings
+
+
+def _there(raw: Log, at: Floats) -> Bools:
+    """Tell at which of the file's instants a log has samples, shape (n,).
+
+    After a longer gap neither does what follows count until the motion has forgotten what was
+    commanded in it.
+    """
+    log = raw.on("command")
+    instants = log.time[log.good] + log.start
+    good = np.ones(len(at), dtype=np.bool_)
+    usual = float(np.median(np.diff(instants)))
+    for k in np.flatnonzero(np.diff(instants) > 1.5 * usual):
+        first, last = instants[k], instants[k + 1]
+        settles = _SETTLES if last - first > _LONG_GAP else 0.0
+        good &= (at <= first) | (at >= last + settles)
+    return good
 
 
 def _from_onset(raw: Log, begin: float) -> CommandCurve:

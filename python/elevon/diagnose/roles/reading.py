@@ -26,7 +26,7 @@ from elevon.diagnose.roles.numbers import (
     smoothed,
 )
 from elevon.experiment import Experiment, Inputs, Variant, signals_by_role
-from elevon.logs.log import Log, on_clock
+from elevon.logs.log import Log, bridged, on_clock
 from elevon.parameters.records import wirings
 from elevon.simulate.prepare import solver_step
 from elevon.units import display_unit, to_display
@@ -275,7 +275,13 @@ class RoleReading(Reading):
                  self._compliant)  # fmt: skip
         out = hashlib.sha256(f"{state!r}".encode())
         # The table's least sizes are those of the log's channels.
-        tables = (self.log.time, self.log["command"], *self.command, *(self.load or ()))
+        tables = (
+            self.log.time,
+            self.log["command"],
+            self.log.good,
+            *self.command,
+            *(self.load or ()),
+        )
         for array in (*tables, *(self.seen[role] for role in sorted(self.seen))):
             out.update(f"{array.shape}".encode() + np.ascontiguousarray(array).tobytes())
         return out.digest()
@@ -291,9 +297,12 @@ class RoleReading(Reading):
         """What each unit shows by the log's roles, on its instants."""
         known = signals_by_role(self.actuator.wiring, "low")
         signals = {role: known[role] for role in self.seen if role in known}
-        over = oversampling(self.rate, solver_step(self.actuator, "low"))
+        step = solver_step(self.actuator, "low")
+        over = oversampling(self.rate, step)
+        # In whole steps: a log's rate need be none, and what it shows is read at its own instants.
+        each = max(round(1.0 / (over * self.rate * step)), 1) * step
         experiment = Experiment(
-            self.log, self.actuator, self._inputs(), signals, rate=f"{over * self.rate:.12g} Hz"
+            self.log, self.actuator, self._inputs(), signals, rate=f"{1.0 / each:.12g} Hz"
         )
         deflection = self.deflection
         runs = experiment.run([unit.variant for unit in units])
@@ -334,6 +343,9 @@ class RoleReading(Reading):
             state = self.log.units[role] == "1"
             filtered = values if state or role.endswith(_SET_POINT) else averaged(values, over)
             out[role] = on_clock(clock, filtered, at, self.log.units[role])
+            if not self.log.good.all():  # where the log has nothing the run shows nothing
+                seen = np.where(self.log.good, out[role], np.nan)
+                out[role] = bridged(self.log.time, seen, self.log.units[role])
         return out
 
     def days(self) -> Days:

@@ -98,7 +98,7 @@ def ungrouped(cell: str, *, comma: bool) -> str:
         return cell
     for pattern, groups, _ in _GROUPED:
         if pattern.fullmatch(text):
-            return "".join(c for c in text if c not in groups).replace(",", ".")
+            return "".join(c for c in text if c not in groups)
     if comma and WHOLE.fullmatch(text):
         return text.replace(".", "")
     return cell

@@ -475,10 +475,10 @@ class LineReader:
 
     def _commas(self, cells: list[str], number: int) -> list[str]:
         """Turn decimal commas into points; a file that uses both is ambiguous and refused."""
-        cells = [ungrouped(c, comma=bool(self.decimal_comma_line)) for c in cells]
-        text = "".join(cells)
+        given, cells = cells, [ungrouped(c, comma=bool(self.decimal_comma_line)) for c in cells]
         if self.delimiter == ",":
-            return cells
+            return [c if c == g else c.replace(",", ".") for c, g in zip(cells, given, strict=True)]
+        text = "".join(cells)
         if "." in text and not self.decimal_point_line:
             self.decimal_point_line = number
         if "," in text and not self.decimal_comma_line:
