@@ -12,6 +12,7 @@ from elevon.recording import Recording
 from elevon.recording.plot import code_names
 from elevon.report import Report, ReportTable, Section, provenance
 from elevon.report.figures import new_figure
+from elevon.safety.outcomes import Outcome
 from elevon.safety.result import HazardResult, HazardRow, SafetyResult
 from elevon.safety.tables import FMEA, fmea
 from elevon.safety.tree import fault_tree
@@ -160,7 +161,7 @@ def _failures(section: Section, result: SafetyResult, actuator: Actuator) -> Non
 
 
 def _fidelity(section: Section, result: SafetyResult) -> None:
-    about = result.fidelity
+    about, known = result.fidelity, result.outcomes
     low, high = about.rate_interval
     section.text(
         f"{about.near_limit} situations lie near a limit that could change them. "
@@ -169,6 +170,19 @@ def _fidelity(section: Section, result: SafetyResult) -> None:
         f"limit {about.rate:.1%} did (95 % interval {low:.1%} to {high:.1%}). A hazard counts at "
         "whichever fidelity it shows."
     )
+    rows = [
+        [place, known.rows[place].combination, known.rows[place].situation,
+         _ending(known.low[place]), _ending(known.high[place])]
+        for place in about.changed[:_MOST]
+    ]  # fmt: skip
+    columns = ["Row", "Failures", "Situation", "Reduced model", "Switching model"]
+    section.table(ReportTable(columns, rows, "Situations whose outcome the two do not share."))
+
+
+def _ending(outcome: Outcome) -> str:
+    """What a run came to: hazards, messages, state at the end."""
+    texts = dict.fromkeys([*outcome.hazards, *(item.text for item in outcome.messages)])
+    return ", ".join([*texts, f"ends {outcome.end}"])
 
 
 def _again(result: SafetyResult, actuator: Actuator, finding: HazardRow) -> Recording:
