@@ -141,7 +141,7 @@ def study_monitor_hours(
 @one_blas_thread()
 def _of_actuator(name: str, days: int, seed: int) -> list[HealthyDay]:
     from elevon import Actuator
-    from elevon.calibrate.ways import turns
+    from elevon.calibrate.door import turns
     from elevon.diagnose.monitor import Monitor
     from elevon.diagnose.monitor.by_positions import PositionWindows
     from elevon.diagnose.monitor.by_roles import RoleWindows

@@ -8,10 +8,14 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate import read_logs
-from elevon.calibrate.acceptance import accept
-from elevon.calibrate.backlash import _spans, _unloaded, fit_backlash
-from elevon.calibrate.backlashes import mean_backlash
-from elevon.calibrate.zeros import position_estimates
+from elevon.calibrate.plant import accept
+from elevon.calibrate.positions import (
+    _spans,
+    _unloaded,
+    fit_backlash,
+    mean_backlash,
+    position_estimates,
+)
 from elevon.cli import main
 from elevon.logs.log import Log
 from tests.calibrate.foreign import NOLOAD, draw, run

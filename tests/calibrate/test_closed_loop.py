@@ -9,13 +9,24 @@ import pytest
 from elevon import Actuator, Scenario, simulate
 from elevon.calibrate.door import calibrate as elevon_calibrate
 from elevon.calibrate.stages.closed_loop import calibrate_loop, loop_log, predict
-from elevon.calibrate.stages.closed_loop.fit import Fitted, Searched, choose, final_fit
-from elevon.calibrate.stages.closed_loop.free import asked_for, free_list
+from elevon.calibrate.stages.closed_loop.fit import (
+    Fitted,
+    Searched,
+    choose,
+    final_fit,
+    load_share,
+    steps,
+)
 from elevon.calibrate.stages.closed_loop.intervals import known
+from elevon.calibrate.stages.closed_loop.log import asked_for, free_list
 from elevon.calibrate.stages.closed_loop.model import LoopModel
-from elevon.calibrate.stages.closed_loop.predict import held_out_errors, validate_loop
-from elevon.calibrate.stages.closed_loop.refine import load_share, steps
-from elevon.calibrate.stages.closed_loop.result import _alike, agreement, exchanged
+from elevon.calibrate.stages.closed_loop.result import (
+    _alike,
+    agreement,
+    exchanged,
+    held_out_errors,
+    validate_loop,
+)
 from elevon.errors import InputError, UnknownNameError
 from elevon.estimate.free import Free, inner
 from elevon.estimate.lanes import LaneChannel, Lanes, Point

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from elevon import Actuator
-from elevon.calibrate.compliance import calibrate_compliance
+from elevon.calibrate.drops import calibrate_compliance
 from elevon.cli.runner import run
 from elevon.errors import InputError, RangeError
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from elevon.calibrate.slips import WeightDrop, find_slips, printed_drops
+from elevon.calibrate.drops import WeightDrop, find_slips, printed_drops
 
 ENDS = (0.018432, -0.2304, -0.22118, -0.22118)
 

@@ -8,7 +8,7 @@ import pytest
 from elevon import Actuator
 from elevon.bench.procedure import load_procedure
 from elevon.calibrate.stages import calibrate_parts
-from elevon.calibrate.stages.moves import moves_of
+from elevon.calibrate.stages.rig import moves_of
 from elevon.errors import InputError
 from tests.calibrate.gear_bench import chosen, drawn, make_logs
 

@@ -10,7 +10,7 @@ import math
 import pytest
 
 from elevon.calibrate.stages.closed_loop import calibrate_loop
-from elevon.calibrate.stages.closed_loop.predict import predict
+from elevon.calibrate.stages.closed_loop.result import predict
 from elevon.plain import plain
 from tests.calibrate.linear import Linear, log, square, sweep
 from tests.calibrate.linear_set import datasheet, loop

@@ -8,11 +8,10 @@ import pytest
 
 from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs
-from elevon.calibrate.candidates import candidates
 from elevon.calibrate.door import _refused
 from elevon.calibrate.dynamic import SensitivityTable, choose
+from elevon.calibrate.model_runs import SpeedRuns, candidates
 from elevon.calibrate.outcome import Calibration
-from elevon.calibrate.speed_runs import SpeedRuns
 from elevon.cli.runner import run
 from elevon.errors import InputError, Interrupted, UnknownNameError
 from elevon.logs.formats.drive import write_drive_csv

@@ -8,10 +8,9 @@ import pytest
 from elevon import Actuator
 from elevon.bench.procedure import Procedure
 from elevon.calibrate.stages import calibrate_parts, motor_ratio
-from elevon.calibrate.stages.context import Context
-from elevon.calibrate.stages.loops_by_current import loops_by_current
+from elevon.calibrate.stages.context import Context, smooth
+from elevon.calibrate.stages.loops import loops_by_current
 from elevon.calibrate.stages.screw import relieved
-from elevon.calibrate.stages.smooth import smooth
 from elevon.logs.log import Log
 from tests.calibrate.screw_bench import drawn, make_logs, missed
 

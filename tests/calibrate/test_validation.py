@@ -8,11 +8,10 @@ import pytest
 import elevon
 from elevon import Actuator
 from elevon.calibrate import calibrate, read_logs, validate
+from elevon.calibrate.door import held_out_agreement
 from elevon.calibrate.report import calibration_report, validation_report
-from elevon.calibrate.thresholds import outliers, thresholds
 from elevon.calibrate.validation import SIGNALS, SignalError, Validation
-from elevon.calibrate.ways import held_out_agreement
-from elevon.calibrate.write import write_calibration
+from elevon.calibrate.write import outliers, thresholds, write_calibration
 from elevon.errors import InputError, UnknownNameError
 from tests.calibrate.bench import write_logs
 

@@ -65,7 +65,7 @@ HALF = {
         ["calibrate", "LOG", "--actuator", "torino-rotary", "--out", "OUT/set.toml", "--json"],
     ),
     "validate": (
-        "elevon.calibrate.ways.validate",
+        "elevon.calibrate.door.validate_drive",
         ["validate", "LOG", "--actuator", "torino-rotary", "--report", "OUT/r.html", "--json"],
     ),
     "report": (

@@ -49,7 +49,7 @@ def test_names_resolve_and_submodules_do_not_hide_functions_of_their_name():
 def test_doors_stay_doors_after_every_import():
     """A package of the same name takes no door away: calibrate, diagnose, bench, compare."""
     code = (
-        "import elevon, elevon.cli, elevon.calibrate.ways, elevon.bench.run, elevon.compare, "
+        "import elevon, elevon.cli, elevon.calibrate.door, elevon.bench.run, elevon.compare, "
         "elevon.diagnose.engine, elevon.response; "
         "doors = 'bench calibrate compare diagnose effects fleet monitor next_test predict "
         "read_log response validate'; "

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from elevon.calibrate.backlash import through_backlash
+from elevon.calibrate.positions import through_backlash
 from elevon.diagnose.positions.features import features_of
 from elevon.logs.log import Log
 

@@ -194,7 +194,7 @@ def reproduce_validation(
     SimulationError
         A run did not reach its end.
     """
-    from elevon.calibrate.replay import validate_replay
+    from elevon.calibrate.validation import validate_replay
 
     model = Actuator.load(ACTUATOR)
     logs = _logs(_unit(model), fidelity, seed, part(progress, 0.0, 0.6))
@@ -374,7 +374,7 @@ def _speeds(
     logs: Sequence[tuple[str, Recording]], model: Actuator
 ) -> Callable[[Sequence[Floats]], list[Floats]]:
     """Return what gives the errors of the extensions' speed, shape (n,), for points."""
-    from elevon.calibrate.replay import as_recorded, unit_experiment
+    from elevon.calibrate.validation import as_recorded, unit_experiment
     from elevon.experiment.experiment import Variant
     from elevon.logs.log import Log
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.slips import Slip, WeightDrop, find_slips, printed_drops
+from elevon.calibrate.drops import Slip, WeightDrop, find_slips, printed_drops
 from elevon.errors import InputError
 from elevon.estimate.regression import huber
 from elevon.plain import fields_of

@@ -18,7 +18,7 @@ from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.procedure import Procedure
 from elevon.bench.rig import GRAVITY
-from elevon.calibrate.compliance import calibrate_compliance
+from elevon.calibrate.drops import calibrate_compliance
 from elevon.calibrate.validation import bench_experiment
 from elevon.experiment import Experiment, Inputs
 from elevon.experiment.experiment import Variant, run_all

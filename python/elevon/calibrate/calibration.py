@@ -12,25 +12,26 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.acceptance import accept, missing, shortened, undetermined, with_values
-from elevon.calibrate.backlashes import PER_LOG
-from elevon.calibrate.balance import torque_balance
-from elevon.calibrate.direct import saturated_speed
+from elevon.calibrate.balance import controller_law, saturated_speed, torque_balance
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.kinematics import KINEMATIC, CommandFit, command_fit
-from elevon.calibrate.law import controller_law
+from elevon.calibrate.model_runs import SpeedRuns
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
 from elevon.calibrate.plant import (
     Torque,
+    accept,
     controller_estimates,
+    missing,
     plant_estimates,
+    shortened,
     static_estimate,
     torque_scale,
+    undetermined,
+    with_values,
 )
-from elevon.calibrate.speed_runs import SpeedRuns
+from elevon.calibrate.positions import PER_LOG, gain_estimate, position_estimates
 from elevon.calibrate.stages.context import Context, run_stages, stages_of
 from elevon.calibrate.static import static_friction
-from elevon.calibrate.zeros import gain_estimate, position_estimates
 from elevon.data import packaged_toml
 from elevon.errors import InputError, unknown
 from elevon.estimate import Estimate
@@ -214,7 +215,7 @@ class DriveContext(Context):
     free : sequence of str or None
         Paths requested.
     per_log : sequence of str
-        Of `elevon.calibrate.backlashes.PER_LOG`: estimated for each log.
+        Of `elevon.calibrate.positions.PER_LOG`: estimated for each log.
     fidelity : str or None
         Of model runs; None: only where the regressions fail.
     progress : callable, optional
@@ -375,7 +376,7 @@ def calibrate(
     free : sequence of str, optional
         Parameter paths to estimate; default: all that the logs determine.
     per_log : sequence of str
-        Of `elevon.calibrate.backlashes.PER_LOG`: estimated for each log too, as ``PATH[LOG]``.
+        Of `elevon.calibrate.positions.PER_LOG`: estimated for each log too, as ``PATH[LOG]``.
     fidelity : str
         Of the model runs: ``low`` or ``high``.
     transient : float, optional

@@ -10,9 +10,8 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats, Ints
-from elevon.calibrate.candidates import candidates, start_values, within_inertia
+from elevon.calibrate.model_runs import SpeedRuns, candidates, within_inertia
 from elevon.calibrate.named import named
-from elevon.calibrate.speed_runs import SpeedRuns
 from elevon.errors import InputError, Interrupted
 from elevon.estimate import Estimate, Free, quantile
 from elevon.estimate.covariance import block_covariance
@@ -347,8 +346,7 @@ def dynamic_stage(
 
     required = [p for p in free or () if p not in {item.path for item in known}]
     chosen = candidates(actuator, logs, free)
-    start = start_values(actuator, logs)
-    start |= {item.path: item.value for item in known if item.value != 0.0}
+    start = {item.path: item.value for item in known if item.value != 0.0}
     problem = _best_drive(logs, actuator, chosen, start, fidelity=fidelity, check=check)
     lanes, x = problem.lanes(chosen), inner(chosen, start)
     lanes.refresh(x)

@@ -15,7 +15,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.direct import saturated_speed
+from elevon.calibrate.balance import saturated_speed
 from elevon.errors import InputError
 from elevon.estimate.covariance import block_covariance, joined, robust_covariance
 from elevon.estimate.residual import fit_residual

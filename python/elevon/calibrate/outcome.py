@@ -146,7 +146,7 @@ class Calibration(Result):
 
     def plot(self) -> Figure:
         """Return the estimates over the old values, with their intervals."""
-        from elevon.calibrate.forest import forest
+        from elevon.calibrate.report import forest
 
         return forest(self.estimates) or super().plot()
 

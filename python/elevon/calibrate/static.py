@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.motion import acceleration_of, delayed, kernel, lagged, motion_of, smoothed
+from elevon.calibrate.balance import acceleration_of, delayed, kernel, lagged, motion_of, smoothed
 from elevon.estimate.covariance import block_covariance
 from elevon.estimate.regression import Regression
 from elevon.estimate.residual import fit_residual, robust_weights

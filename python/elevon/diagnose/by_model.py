@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.ways import turns
+from elevon.calibrate.door import turns
 from elevon.diagnose.engine.candidates import chosen, not_candidates
 from elevon.diagnose.engine.case import calibrated, case_of
 from elevon.diagnose.engine.diagnosis import NEVER_SEEN, UNDECIDED, answer_of

@@ -23,7 +23,7 @@ from elevon.bench.procedure import (
 from elevon.bench.rig import setups
 from elevon.bench.stand import stand_of
 from elevon.bench.traces import first_trace, recorded, traced
-from elevon.calibrate.ways import turns
+from elevon.calibrate.door import turns
 from elevon.diagnose.by_model import reading_of
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.case import LogCase

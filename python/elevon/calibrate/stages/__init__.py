@@ -3,7 +3,7 @@
 A stage is chosen by what the actuator has, and says itself why the logs do not show its numbers.
 """
 
+from elevon.calibrate.stages.context import motor_ratio, role_log
 from elevon.calibrate.stages.flow import STAGES, calibrate_parts
-from elevon.calibrate.stages.log import motor_ratio, role_log
 
 __all__ = ["STAGES", "calibrate_parts", "motor_ratio", "role_log"]

@@ -2,20 +2,156 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
+import numpy as np
+
 from elevon.actuator import Actuator
+from elevon.arrays import Bools, Floats
 from elevon.calibrate.named import named
-from elevon.calibrate.stages.log import motor_ratio
 from elevon.data import packaged_toml
 from elevon.errors import InputError, Interrupted
 from elevon.estimate import Estimate
-from elevon.logs.log import Log
+from elevon.estimate.signals import local_polynomial
+from elevon.logs.log import Log, per_log
 from elevon.parameters.records import record_of, records
 from elevon.progress import Progress, part
+from elevon.recording import Recording
+
+_FEWEST = 100  # samples
+#: Friction per torque of the motor, where the law of friction knows of it; the laws that do not.
+LOAD_SHARE, LAWS_WITHOUT_LOAD = "friction.load_motor", ("borello", "stribeck")
+#: Share of the highest speed over which friction falls from rest to motion. ASSUMED: no log at
+#: 100 Hz settles it; half and twice as much are part of the intervals of a fit in closed loop.
+FALL = 0.02
+#: What shows the motor's speed, the best first.
+MOTION = ("motor_speed", "motor_position", "output_speed", "output_position")
+
+
+def role_log(recording: Recording, name: str, actuator: Actuator) -> Log:
+    """Return what the calibration needs of a recording, by the roles it states.
+
+    The clock is that of the output's position for an actuator with a control unit of its own, of
+    the torque current for a servo. A log without the motor's speed has it from what else it shows
+    of the motion.
+
+    Raises
+    ------
+    InputError
+        A role that is needed is missing, nothing of the motion was recorded, or the log is too
+        short.
+    """
+    servo = "control.position_gain" in actuator.parameters
+    log = Log.of(recording, name, clock="torque_current" if servo else "output_position")
+    if len(log.time) < _FEWEST:
+        raise InputError(f"{name}: {len(log.time)} samples; at least {_FEWEST}")
+    if log.has("motor_speed"):
+        return log
+    return log.with_channels(motor_speed=_speed(log, motor_ratio(actuator)))
+
+
+def motor_ratio(actuator: Actuator) -> float:
+    """Return the motor's angle over the output's coordinate, rad/rad or rad/m."""
+    known, value = actuator.parameters, actuator.parameters.value
+    stages = ("gear.ratio",) if "gear.ratio" in known else ("gear.ratio_first", "gear.ratio_second")
+    lead = value("screw.lead") if "screw.lead" in known else 1.0
+    return math.prod(value(path) for path in stages) / lead
+
+
+def grows_with_torque(top_speed: float) -> dict[str, str | float]:
+    """Return the choices with which friction grows with the motor's torque alone.
+
+    Parameters
+    ----------
+    top_speed : float
+        Highest of the logs [rad/s].
+    """
+    return {
+        "friction.law": "load_dependent", "friction.stribeck_speed": FALL * top_speed,
+        "friction.load_external": 0.0, "friction.load_motor_stribeck": 0.0,
+        "friction.load_external_stribeck": 0.0,
+    }  # fmt: skip
+
+
+def geared(actuator: Actuator) -> bool:
+    """Return whether the motor's torque passes a gear or a screw, which may lose a share of it."""
+    return motor_ratio(actuator) != 1.0
+
+
+def _speed(log: Log, ratio: float) -> Floats:
+    """Motor's speed from what else was recorded of the motion, the best first."""
+    motion = next((role for role in MOTION[1:] if log.has(role)), None)
+    if motion is None:
+        one = ", ".join(MOTION)
+        raise InputError(f"{log.name}: nothing of the motion was recorded; one of {one}")
+    values = np.gradient(log[motion], log.time) if motion.endswith("position") else log[motion]
+    return np.asarray((1.0 if motion == "motor_position" else ratio) * values)
+
+
+LOAD = ("load", "load_cell")
+_WIDTH = 0.05  # s of the polynomials that smooth all channels alike
+#: Eighth order, in the order in which a convolution takes it.
+_STENCIL = np.array([-3, 32, -168, 672, 0, -672, 168, -32, 3]) / 840.0
+_SLOPES = {"acceleration": "motor_speed", "current_slope": "torque_current"}
+_SLOWEST = 0.01  # s between samples, from which a log shows temperatures only
+_MOVES = 0.05  # of the largest speed: below it the friction's sign is open
+CORNERS = (
+    0.06,
+    0.1,
+)  # s about a reversal or a limit that do not count; the second is a choice as good
+_LIMIT = 0.98  # of the largest set point of the current: the drive is limited
+
+
+def quick(log: Log) -> bool:
+    """Whether the motion is sampled quickly enough for balances."""
+    return log.period < _SLOWEST
+
+
+def loaded(log: Log) -> bool:
+    """Whether the force on the ram was measured."""
+    return any(log.has(role) for role in LOAD)
+
+
+@per_log
+def smooth(log: Log) -> dict[str, Floats]:
+    """All channels, and slopes of speed, position and current, through one smoother."""
+    slopes = {name: slope(log[role], log.period) for name, role in _SLOPES.items() if log.has(role)}
+    every = {**log.channels, **slopes}
+    return {role: smoothed(values, log.period) for role, values in every.items()}
+
+
+def apart(log: Log, corner: float = CORNERS[0]) -> Bools:
+    """Return the samples in motion, so long apart from reversals and limits."""
+    speed = smooth(log)["motor_speed"]
+    away = np.abs(speed) < _MOVES * float(np.max(np.abs(speed)))
+    if log.has("current_ref"):
+        size = np.abs(log["current_ref"])
+        top = float(np.max(size))
+        away |= (size > _LIMIT * top) & (np.median(size) < 0.5 * top)
+    width = 2 * round(corner / log.period) + 1
+    near = np.convolve(away.astype(float), np.ones(width), mode="same") > 0.5
+    edge = (log.time < _WIDTH) | (log.time > log.time[-1] - _WIDTH)
+    return np.asarray(~near & ~edge)
+
+
+def smoothed(values: Floats, period: float) -> Floats:
+    """Values through the polynomials that smooth all channels alike."""
+    return local_polynomial(values, period, _WIDTH, order=3)
+
+
+def slope(values: Floats, period: float) -> Floats:
+    """Slope by central differences of eighth order: in a balance it is smoothed like the rest.
+
+    The slope of a polynomial through the smoother's window is smoothed more than the values are:
+    at the corners of a trapezoid that made masses 10 % too large.
+    """
+    padded = np.pad(values, 4, mode="edge")
+    return np.asarray(np.convolve(padded, _STENCIL / period, mode="valid"), dtype=np.float64)
+
 
 C = TypeVar("C", bound="Context")
 _WIDE = 0.2  # of a value: a deviation above which it is not determined

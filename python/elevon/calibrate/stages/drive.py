@@ -9,11 +9,17 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.replay import as_recorded, replayed, unit_experiment
-from elevon.calibrate.stages.block_drive import Motor, driving, motor_constants
+from elevon.calibrate.stages.block_drive import (
+    Constants,
+    Motor,
+    TrainBalance,
+    driving,
+    motor_constants,
+    torque_balance,
+)
 from elevon.calibrate.stages.context import Context
-from elevon.calibrate.stages.moves import Move, moves_of
-from elevon.calibrate.stages.train import Constants, TrainBalance, torque_balance
+from elevon.calibrate.stages.rig import Move, moves_of
+from elevon.calibrate.validation import as_recorded, replayed, unit_experiment
 from elevon.errors import ElevonError
 from elevon.estimate import Determined, Estimate
 from elevon.estimate.number import as_values

@@ -10,23 +10,25 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
-from elevon.calibrate.stages import loops, motor, screw
-from elevon.calibrate.stages.context import Context, run_stages, stages_of
+from elevon.calibrate.stages import loops, screw
+from elevon.calibrate.stages.context import Context, motor_ratio, run_stages, stages_of
 from elevon.calibrate.stages.drive import drive
 from elevon.calibrate.stages.heat import heat
-from elevon.calibrate.stages.log import motor_ratio
-from elevon.calibrate.stages.loops_by_current import loops_by_current
-from elevon.calibrate.stages.moves import Move, moves_of, rig_moves
-from elevon.calibrate.stages.rig_tables import (
+from elevon.calibrate.stages.loops import loops_by_current
+from elevon.calibrate.stages.rig import (
     GRAVITY,
     KNOTS,
+    Move,
+    RigTest,
     friction_knots,
     hanging_mass,
     harmonic_knots,
     hats,
     knots,
+    moves_of,
+    rig_moves,
+    rig_tests,
 )
-from elevon.calibrate.stages.rig_tests import RigTest, rig_tests
 from elevon.data import packaged_toml
 from elevon.errors import InputError, unknown
 from elevon.estimate import Estimate
@@ -232,8 +234,8 @@ _PRELOAD = "screw.efficiency_aiding"  # a preloaded screw has it
 
 STAGES = stages_of("parts", {
     "rig": friction, "speed control": loops.unit_gains, "set points": loops.set_points,
-    "drive": drive, "lock": travels, "brake": brake, "motor": motor.motor_constants,
-    "load side": motor.load_side, "torque": screw.torque, "position loop": loops.position_loop,
+    "drive": drive, "lock": travels, "brake": brake, "motor": screw.motor_constants,
+    "load side": screw.load_side, "torque": screw.torque, "position loop": loops.position_loop,
     "speed loop": loops.speed_control, "loops by current": loops_by_current, "heat": heat,
 })  # fmt: skip
 _KINDS = {_UNIT: "unit", _PRELOAD: "preload"}

@@ -14,9 +14,8 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.stages.context import Context
+from elevon.calibrate.stages.context import Context, loaded
 from elevon.calibrate.stages.screw import nut_force, nut_loss
-from elevon.calibrate.stages.smooth import loaded
 from elevon.estimate import Determined, Estimate, Free
 from elevon.estimate.residual import BalanceFit, fit_balance
 from elevon.logs.drive import group_means

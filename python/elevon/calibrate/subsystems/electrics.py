@@ -9,7 +9,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.stages.log import motor_ratio
+from elevon.calibrate.stages.context import motor_ratio
 from elevon.calibrate.subsystems.signals import FEWEST, REST_SPEED, DriveSignals, low_pass
 from elevon.errors import InputError
 from elevon.estimate import Estimate

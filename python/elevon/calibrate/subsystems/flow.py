@@ -14,8 +14,14 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.outcome import Calibration, by_path, log_facts
-from elevon.calibrate.stages.context import Context, Stage, run_stages, stages_of
-from elevon.calibrate.stages.log import geared, motor_ratio
+from elevon.calibrate.stages.context import (
+    Context,
+    Stage,
+    geared,
+    motor_ratio,
+    run_stages,
+    stages_of,
+)
 from elevon.calibrate.subsystems.controller import (
     Controller,
     LawNumbers,

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from elevon.actuator import Actuator
 from elevon.calibrate.named import named
-from elevon.calibrate.stages.log import (
+from elevon.calibrate.stages.context import (
     LAWS_WITHOUT_LOAD,
     LOAD_SHARE,
     grows_with_torque,

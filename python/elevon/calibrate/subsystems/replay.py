@@ -8,7 +8,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.stages.log import LOAD_SHARE, grows_with_torque, motor_ratio
+from elevon.calibrate.stages.context import LOAD_SHARE, grows_with_torque, motor_ratio
 from elevon.calibrate.subsystems.controller import LawNumbers, SampledLaw
 from elevon.calibrate.subsystems.signals import DriveSignals, useful_band
 from elevon.errors import InputError

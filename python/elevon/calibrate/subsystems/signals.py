@@ -10,7 +10,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.stages.log import motor_ratio
+from elevon.calibrate.stages.context import motor_ratio
 from elevon.errors import InputError
 from elevon.logs.log import Log, bridged
 from elevon.parameters.relations import emf_constant, motor_torque_constant

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elevon.arrays import Floats
-from elevon.calibrate.ways import turns
+from elevon.calibrate.door import turns
 from elevon.errors import InputError, unknown
 from elevon.faults import FaultRecord, catalogue
 from elevon.simulate.acting import own_faults

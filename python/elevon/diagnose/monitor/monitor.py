@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.arrays import Floats
-from elevon.calibrate.ways import turns
+from elevon.calibrate.door import turns
 from elevon.diagnose.engine.candidates import chosen
 from elevon.diagnose.monitor.answer import (
     Alarm,

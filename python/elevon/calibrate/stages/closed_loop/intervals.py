@@ -10,10 +10,9 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.calibrate.stages.closed_loop.fit import Fitted
-from elevon.calibrate.stages.closed_loop.free import CURRENT_GAIN, STICK
-from elevon.calibrate.stages.closed_loop.log import motion
+from elevon.calibrate.stages.closed_loop.log import CURRENT_GAIN, STICK, motion
 from elevon.calibrate.stages.closed_loop.model import LoopModel
-from elevon.calibrate.stages.log import FALL, LOAD_SHARE
+from elevon.calibrate.stages.context import FALL, LOAD_SHARE
 from elevon.estimate import Free
 from elevon.estimate.covariance import block_covariance
 from elevon.estimate.lanes import Lanes, Point
