@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from elevon.actuator import Actuator
 from elevon.calibrate.door import calibrate, validate
 from elevon.calibrate.subsystems.controller import identify_controller
 from elevon.calibrate.subsystems.flow import calibrate_machine, identify
+from elevon.calibrate.subsystems.signals import MOST, STRETCHES, excerpts
+from elevon.calibrate.validation import phases_of
 from elevon.cli.runner import run as elevon
 from elevon.errors import InputError
 from elevon.logs.log import Log
@@ -273,3 +276,41 @@ def test_without_braking_a_loss_is_possible_and_said():
     assert "load_loss" not in found.subsystems["mechanics"].parameters
     assert any("a loss that grows with the effort is not seen" in text for text in
                found.inverse.findings)  # fmt: skip
+
+
+def test_a_long_log_is_read_in_stretches_spread_over_it(known):
+    drive = identify([known], axis(), scale=f"{FORCE} N/V").drives[0]
+    assert excerpts(drive) == [drive]
+    times = 12
+    long = replace(
+        drive, time=PERIOD * np.arange(times * len(drive.time)),
+        **{name: np.tile(getattr(drive, name), times)
+           for name in ("good", "effort", "position", "command")},
+    )  # fmt: skip
+    parts = excerpts(long)
+    assert sum(len(part.time) for part in parts) == MOST < len(long.time)
+    assert len(parts) == STRETCHES
+    assert all(part.time[0] == 0.0 for part in parts)
+    assert np.array_equal(parts[-1].effort, long.effort[-len(parts[-1].time) :])
+
+
+def test_errors_of_start_steady_motion_reversal_and_contact_stand_apart(known):
+    found = calibrate(known, axis(), torque_constant=f"{FORCE} N/V")
+    phases = found.validation.phases
+    assert {"start", "steady", "reversal"} >= phases.keys() >= {"reversal"}
+    rows = {row.signal: row for row in phases["reversal"]}
+    assert rows["open_loop_speed"].rms > 0.0
+    whole = {row.signal: row for row in found.validation.errors}
+    assert rows["open_loop_speed"].largest <= whole["open_loop_speed"].largest
+
+
+def test_phases_of_a_stroke_there_and_back():
+    time = 1e-3 * np.arange(4000)
+    steps = np.select([time < 0.5, time < 1.5, time < 2.5], [0.0, 1.0, -1.0], 0.0)
+    speed = np.convolve(steps, np.ones(20) / 20.0, mode="same")
+    parts = phases_of(time, speed, np.where(time > 2.0, 5.0, 0.0))
+    inside = {name: (time[used].min(), time[used].max()) for name, used in parts.items()}
+    assert inside["start"] == pytest.approx((0.39, 0.59), abs=0.02)
+    assert inside["reversal"] == pytest.approx((1.4, 1.6), abs=0.02)
+    assert inside["contact"][0] == pytest.approx(2.0, abs=2e-3)
+    assert not any(parts["steady"] & (parts["start"] | parts["reversal"]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -56,32 +57,29 @@ class SensitivityTable:
         chosen = tuple(self.free[k] for k in left)
         return replace(self, free=chosen, jacobian=self.jacobian[:, list(left)])
 
+    @cached_property
     def covariance(self) -> Floats:
-        """Covariance that a fit would have, shape (p, p), in meaningful changes."""
+        """That a fit would have, shape (p, p), in meaningful changes."""
         scores = self.jacobian * np.clip(self.residual, -_BOUND, _BOUND)[:, None]
         return block_covariance(self.jacobian.T @ self.jacobian, scores, self.blocks)[0]
 
+    @property
+    def std(self) -> Floats:
+        """Deviations of the candidates."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
-@dataclass(frozen=True)
-class _Spread:
-    """Deviations and correlations of candidates, from their covariance."""
-
-    free: tuple[Free, ...]
-    std: Floats
-    correlation: Floats
-
-    @classmethod
-    def of(cls, table: SensitivityTable) -> _Spread:
-        covariance = table.covariance()
-        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        if not np.isfinite(std).all() or not std.all():
-            return cls(table.free, std, np.ones_like(covariance))
-        correlation = covariance / np.outer(std, std)
+    @property
+    def correlation(self) -> Floats:
+        """Of each with each other candidate, shape (p, p)."""
+        if not self.finite:
+            return np.ones_like(self.covariance)
+        correlation = self.covariance / np.outer(self.std, self.std)
         np.fill_diagonal(correlation, 0.0)
-        return cls(table.free, std, correlation)
+        return np.asarray(correlation)
 
     @property
     def finite(self) -> bool:
+        """Whether each candidate is determined at all."""
         return bool(np.isfinite(self.std).all() and self.std.all())
 
     @property
@@ -144,7 +142,7 @@ def rank(table: SensitivityTable, dropped: dict[str, str] | None = None) -> Iden
     """Rank candidates by what they do to the residuals."""
     names = [item.path for item in table.free]
     _, singular, directions = np.linalg.svd(table.jacobian, full_matrices=False)
-    spread = _Spread.of(table)
+    spread = table
     order = np.argsort(-np.abs(directions[-1]))[:4]
     pairs = [
         (names[i], names[j], float(spread.correlation[i, j]))
@@ -182,7 +180,7 @@ def choose(table: SensitivityTable, required: Sequence[str]) -> tuple[list[int],
     dropped = _unexcited(table, required)
     left = [k for k, item in enumerate(free) if item.path not in dropped]
     while left:
-        spread = _Spread.of(table.only(left))
+        spread = table.only(left)
         optional = [j for j, item in enumerate(spread.free) if item.path not in required]
         # Of two that cannot be determined apart, the looser one goes.
         worst = max(optional, key=lambda j: (spread.blind[j], spread.loose[j]), default=None)

@@ -297,6 +297,13 @@ def _agreement(report: Report, before: Validation | None, after: Validation) -> 
     old = {(e.log, e.signal): e for e in before.errors} if before else {}
     rows = [_error_row(e, old.get((e.log, e.signal))) for e in after.errors]
     section.table(ReportTable.of(rows, digits=3))
+    if after.phases:
+        each = [
+            {"Phase": phase, **_error_row(error, None)}
+            for phase, rows in after.phases.items()
+            for error in rows
+        ]
+        section.table(ReportTable.of(each, "Start, steady motion, reversal, contact.", digits=3))
     earlier = {t.log: t for t in before.traces} if before else {}
     units = {e.signal: e.unit for e in after.errors}
     for trace in after.traces:

@@ -35,13 +35,26 @@ _EXPONENTS = (1.0, 2.0)
 
 
 @dataclass(frozen=True)
-class Presliding:
-    """Static friction [N m], its deviation, degrees of freedom; stiffness of bristles [N m/rad]."""
+class StaticFriction:
+    """Static friction.
 
-    static: float
+    Attributes
+    ----------
+    value, std : float
+        And its deviation [N m].
+    degrees : float
+        Degrees of freedom of the deviation.
+    unseen : float
+        What it may be higher by, whatever the log shows [N m].
+    how : str
+        How it was read.
+    """
+
+    value: float
     std: float
     degrees: float
-    stiffness: float
+    unseen: float
+    how: str
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,7 @@ class _Windows:
 
 def presliding_friction(
     logs: Sequence[Log], plant: Regression, constant: float
-) -> Presliding | None:
+) -> StaticFriction | None:
     """Fit the bristles to all reversals of the logs.
 
     What no log settles enters the deviation as the difference it makes: the law of the fall from
@@ -79,7 +92,7 @@ def presliding_friction(
 
     Returns
     -------
-    Presliding or None
+    StaticFriction or None
         None with fewer than four reversals.
     """
     windows = _windows(logs, plant, constant)
@@ -100,7 +113,11 @@ def presliding_friction(
     variance, degrees = best.variance(windows)
     spread = sum((other - best.static) ** 2 for other in others) + beyond**2
     std = float(np.sqrt(variance + spread))
-    return Presliding(best.static + beyond, std, degrees, float(np.exp(best.x[0])))
+    how = (
+        "peak of the friction that the creep before sliding shows; the shaft deflects as bristles "
+        f"of {float(np.exp(best.x[0])):.2g} N m/rad, and how friction falls from there is open"
+    )
+    return StaticFriction(best.static + beyond, std, degrees, 0.0, how)
 
 
 def usable_logs(logs: Sequence[Log]) -> list[Log]:
@@ -337,8 +354,8 @@ def breakaway_torque(
     offset: float,
     lag: float,
     slow: float,
-) -> tuple[float, float, float] | None:
-    """Static friction from all breakaways: value, deviation [N m] and degrees of freedom.
+) -> StaticFriction | None:
+    """Return the static friction of all breakaways.
 
     Parameters
     ----------
@@ -353,7 +370,7 @@ def breakaway_torque(
 
     Returns
     -------
-    (float, float, float) or None
+    StaticFriction or None
         Median; its deviation from the scatter, from the climb within one sample, in which the
         instant may be misplaced alike every time, and from the set point's own shift. None with
         fewer than four breakaways.
@@ -369,7 +386,8 @@ def breakaway_torque(
     climb = constant * float(np.median(every.slope)) * period / np.sqrt(3.0)
     noise_part = _MEDIAN * scatter / np.sqrt(count)
     std = float(np.sqrt(noise_part**2 + climb**2 + (constant * every.behind) ** 2))
-    return middle, std, count - 1.0
+    how = "torque at which the shaft breaks away; ripple that the log does not show lowers it"
+    return StaticFriction(middle, std, count - 1.0, _RIPPLE * middle, how)
 
 
 @dataclass(frozen=True)
@@ -507,29 +525,6 @@ _LONG = (
 _RIPPLE = 0.06
 
 
-@dataclass(frozen=True)
-class StaticFriction:
-    """Static friction.
-
-    Attributes
-    ----------
-    value, std : float
-        And its deviation [N m].
-    degrees : float
-        Degrees of freedom of the deviation.
-    unseen : float
-        What it may be higher by, whatever the log shows [N m].
-    how : str
-        How it was read.
-    """
-
-    value: float
-    std: float
-    degrees: float
-    unseen: float
-    how: str
-
-
 def static_friction(
     logs: Sequence[Log], plant: Regression, constant: float
 ) -> StaticFriction | None:
@@ -553,22 +548,9 @@ def static_friction(
     if not slow > 0.0:
         return None
     if _gives(logs, plant, slow):
-        creep = presliding_friction(logs, plant, constant)
-        if creep is None:
-            return None
-        how = (
-            "peak of the friction that the creep before sliding shows; the shaft deflects as "
-            f"bristles of {creep.stiffness:.2g} N m/rad, and how friction falls from there is open"
-        )
-        return StaticFriction(creep.static, creep.std, creep.degrees, 0.0, how)
+        return presliding_friction(logs, plant, constant)
     offset = plant["offset" if "offset" in plant.names else "constant"]
-    torque_level = breakaway_torque(
-        logs, constant=constant, offset=offset, lag=plant["lag"], slow=slow
-    )
-    if torque_level is None:
-        return None
-    how = "torque at which the shaft breaks away; ripple that the log does not show lowers it"
-    return StaticFriction(*torque_level, _RIPPLE * torque_level[0], how)
+    return breakaway_torque(logs, constant=constant, offset=offset, lag=plant["lag"], slow=slow)
 
 
 def _gives(logs: Sequence[Log], plant: Regression, slow: float) -> bool:

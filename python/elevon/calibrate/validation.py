@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
 
 from elevon.actuator import Actuator
-from elevon.arrays import Bools, Floats
+from elevon.arrays import Bools, Floats, Ints
 from elevon.calibrate.kinematics import command_fit
 from elevon.errors import InputError, Interrupted, SimulationError, unknown
 from elevon.experiment import Experiment, Inputs, ModelRun
@@ -38,6 +38,49 @@ TRANSIENT = 10.0  # s, as the published comparison leaves out
 #: % of the signal's RMS about its mean: a model that leaves more explains less than three quarters
 #: of what it does. ASSUMED
 UNEXPLAINED = 50.0
+
+
+#: Of the highest speed: below it the machine rests; of the largest change of speed: below it the
+#: motion is steady; s that a start and a reversal last. ASSUMED
+RESTS, STEADY, LASTS = 0.02, 0.1, 0.1
+CONTACT = 0.1  # of the largest load: from it on the output pushes. ASSUMED
+_LOADS = ("load", "load_cell")
+
+
+def phases_of(time: Floats, speed: Floats, load: Floats | None = None) -> dict[str, Bools]:
+    """Return the samples of a motion that start, run steadily, reverse, and push on a load.
+
+    Parameters
+    ----------
+    time, speed : ndarray, shape (n,)
+        s; in any unit.
+    load : ndarray, shape (n,), optional
+        As measured; None: nothing shows a contact.
+    """
+    top = float(np.nanmax(np.abs(speed), initial=0.0))
+    moving = np.abs(np.nan_to_num(speed)) > RESTS * top
+    period = float(np.median(np.diff(time)))
+    width = max(round(LASTS / period), 1)
+    direction = np.sign(speed) * moving
+    at = np.flatnonzero(moving)
+    turns = at[1:][direction[at[1:]] != direction[at[:-1]]]
+    begins = np.flatnonzero(np.diff(moving.astype(np.int8), prepend=0) == 1)
+
+    def after(instants: Ints) -> Bools:
+        out = np.zeros(len(time), dtype=np.bool_)
+        for k in instants:
+            out[max(k - width, 0) : k + width] = True
+        return out
+
+    reversal = after(turns)
+    start = after(np.setdiff1d(begins, turns)) & ~reversal
+    smooth = np.convolve(np.nan_to_num(speed), np.ones(width) / width, mode="same")
+    change = np.abs(np.gradient(smooth, period))
+    steady = moving & (change < STEADY * float(change.max(initial=0.0))) & ~start & ~reversal
+    phases = {"start": start, "steady": steady, "reversal": reversal}
+    if load is not None:
+        phases["contact"] = np.abs(load) > CONTACT * float(np.nanmax(np.abs(load), initial=0.0))
+    return phases
 
 
 @dataclass(frozen=True)
@@ -110,19 +153,26 @@ class ValidationTrace(Plain):
         curve = command_curve(log) if log.has("command") else None
         return cls(log.name, log.time, measured, simulated, log.good, about_breaks(curve, log))
 
+    def phases(self) -> dict[str, Bools]:
+        """Return the samples of each phase of the motion; none where no speed was compared."""
+        speed = next((name for name in self.measured if name.endswith("speed")), None)
+        if speed is None or len(self.time) < 2:
+            return {}
+        load = next((self.measured[name] for name in _LOADS if name in self.measured), None)
+        return phases_of(self.time, self.measured[speed], load)
+
     def errors(
         self,
         units: Mapping[str, str],
         limits: Mapping[str, float] | None = None,
-        offsets: Mapping[str, float] | None = None,
     ) -> list[SignalError]:
-        """Return the error of every channel where samples count, offsets taken off the log."""
+        """Return the error of every channel where samples count."""
         rows = []
         for name, simulated in self.simulated.items():
             mask = self.used & np.isfinite(self.measured[name])
             if not mask.any():
                 continue  # a stretch shorter than what settles shows nothing
-            data = self.measured[name][mask] - (offsets or {}).get(name, 0.0)
+            data = self.measured[name][mask]
             error = simulated[mask] - data
             rms, largest = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
             about, reach = float(np.std(data)), float(np.ptp(data))
@@ -186,7 +236,7 @@ class Validation(Result):
     notes: Mapping[str, str] = field(default_factory=dict)
 
     KIND: ClassVar = "validation"
-    COMPUTED: ClassVar = ("status",)
+    COMPUTED: ClassVar = ("status", "phases")
     TABLE: ClassVar = "errors"
     BARS: ClassVar = ("signal", "rms_percent_of_range")
 
@@ -211,6 +261,20 @@ class Validation(Result):
         from elevon.calibrate.report import validation_report
 
         return validation_report(self, date=date)
+
+    @property
+    def phases(self) -> dict[str, list[SignalError]]:
+        """Errors of what starts, runs steadily, reverses and pushes on a load, each apart."""
+        units = {error.signal: error.unit for error in self.errors}
+        out: dict[str, list[SignalError]] = {}
+        for trace in self.traces:
+            for name, samples in trace.phases().items():
+                for signal, run in trace.simulated.items():
+                    if signal in units:
+                        used = trace.used & samples & np.isfinite(run)
+                        one = replace(trace, simulated={signal: run}, used=used)
+                        out.setdefault(name, []).extend(one.errors(units))
+        return {name: rows for name, rows in out.items() if rows}
 
     @property
     def status(self) -> str:
@@ -551,20 +615,26 @@ def validate_replay(
     for number, (name, recording) in enumerate(logs):
         share = part(progress, number / len(logs), (number + 1) / len(logs))
         log = Log.of(recording, name, clock="output_position")
-        trace = _replayed_trace(log, actuator, fidelity, given, share)
+        trace = _replayed_trace(log, actuator, fidelity, given, offsets, share)
         traces.append(trace)
         limits = promised(actuator, "limits", trace.measured)
-        errors += trace.errors(log.units, limits, offsets)
+        errors += trace.errors(log.units, limits)
     how = {name: "as logged" for name, _ in logs}
     return Validation(actuator.name, fidelity, given, tuple(errors), how, tuple(traces), offsets)
 
 
-def _replayed_trace(
-    log: Log, actuator: Actuator, fidelity: str, transient: float, progress: Progress | None
+def _replayed_trace(  # noqa: PLR0917 - what a log is held against
+    log: Log,
+    actuator: Actuator,
+    fidelity: str,
+    transient: float,
+    offsets: Mapping[str, float],
+    progress: Progress | None,
 ) -> ValidationTrace:
     late, experiment = log.after(transient), unit_experiment(log, actuator, fidelity)
     run = replayed(experiment, progress)
     roles = [role for role in experiment.shows if log.units.get(role) != "1"]
     simulated = {role: as_recorded(log, run, role) for role in roles}
     used = late.good & (log.time <= run.seconds)
-    return ValidationTrace(log.name, log.time, {role: log[role] for role in roles}, simulated, used)
+    measured = {role: log[role] - offsets.get(role, 0.0) for role in roles}
+    return ValidationTrace(log.name, log.time, measured, simulated, used)

@@ -15,7 +15,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.stages.context import motor_ratio
+from elevon.calibrate.stages.context import Balance, motor_ratio
 from elevon.calibrate.stages.rig import KNOTS, Move, hats, knots, moves_of
 from elevon.estimate import Estimate, Free
 from elevon.estimate.regression import Regression, regressed
@@ -341,15 +341,6 @@ _FIRST_FORCE = 20.0  # N, first deviation of the residual
 
 
 @dataclass(frozen=True)
-class TrainBalance:
-    """What the balance determines, why it does not the rest, and its residual [N]."""
-
-    levels: dict[str, Estimate]
-    reasons: dict[str, str]
-    residual: float
-
-
-@dataclass(frozen=True)
 class _TrainSamples:
     """Stacked samples: balance without what is free, and what it is made of."""
 
@@ -392,7 +383,7 @@ class Constants:
     inertia: tuple[Floats, Floats]
 
 
-def torque_balance(parts: Sequence[Driving], known: Constants) -> TrainBalance:
+def torque_balance(parts: Sequence[Driving], known: Constants) -> Balance:
     """BalanceFit the train to the samples in which the motor drives under a known load."""
     moves = ("extension", "retraction")
     paths = [f"friction.ffm_{direction}_{k}" for direction in moves for k in range(1, KNOTS + 1)]
@@ -401,9 +392,7 @@ def torque_balance(parts: Sequence[Driving], known: Constants) -> TrainBalance:
     loaded = [part for part in parts if "load" in part.channels or factor > 0.0]
     if not loaded:
         why = "no motion in which the motor drives under a known load"
-        return TrainBalance(
-            {}, dict.fromkeys((_INERTIA, _UNLOADED, _LOADED, *open_paths), why), np.nan
-        )
+        return Balance({}, dict.fromkeys((_INERTIA, _UNLOADED, _LOADED, *open_paths), why), np.nan)
     # A direction that no sample shows is not free.
     directions = {_direction(part) for part in loaded}
     free = [path for path in open_paths if path.split("_")[1] in directions]
@@ -422,7 +411,7 @@ def torque_balance(parts: Sequence[Driving], known: Constants) -> TrainBalance:
         for path in open_paths
         if path not in free
     }
-    return TrainBalance(levels, reasons | unreached | idle, fit.residual)
+    return Balance(levels, reasons | unreached | idle, fit.residual)
 
 
 def _fitted_train(

@@ -278,6 +278,15 @@ class Context:
 
 
 @dataclass(frozen=True)
+class Balance:
+    """What a balance of torques determines, why it does not the rest, and its residual [SI]."""
+
+    levels: dict[str, Estimate]
+    reasons: dict[str, str]
+    residual: float
+
+
+@dataclass(frozen=True)
 class Stage(Generic[C]):
     """A part of a calibration; it says itself why the logs do not show what it gives.
 

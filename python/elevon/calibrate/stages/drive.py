@@ -12,12 +12,11 @@ from elevon.arrays import Bools, Floats
 from elevon.calibrate.stages.block_drive import (
     Constants,
     Motor,
-    TrainBalance,
     driving,
     motor_constants,
     torque_balance,
 )
-from elevon.calibrate.stages.context import Context
+from elevon.calibrate.stages.context import Balance, Context
 from elevon.calibrate.stages.rig import Move, moves_of
 from elevon.calibrate.validation import as_recorded, replayed, unit_experiment
 from elevon.errors import ElevonError
@@ -375,7 +374,7 @@ class _Reading:
     levels: dict[str, Estimate]
     reasons: dict[str, str]
     motor: Motor
-    balance: TrainBalance
+    balance: Balance
 
 
 @dataclass(frozen=True)

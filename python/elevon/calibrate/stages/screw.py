@@ -15,7 +15,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.stages.context import CORNERS, Context, apart, loaded, quick, smooth
+from elevon.calibrate.stages.context import CORNERS, Balance, Context, apart, loaded, quick, smooth
 from elevon.estimate import Estimate, Free
 from elevon.estimate.covariance import Strokes
 from elevon.estimate.regression import Regression, regressed
@@ -136,15 +136,6 @@ _RELIEF = 2.0 * np.sqrt(2.0)
 _SERIES = (1.53960, -1.19476, 1.13376, -0.67106, 0.19246)
 
 
-@dataclass(frozen=True)
-class TorqueBalance:
-    """What the balance determines, why it does not the rest, and its residual [N m]."""
-
-    levels: dict[str, Estimate]
-    reasons: dict[str, str]
-    residual: float
-
-
 def relieved(force: Floats, preload: float) -> Floats:
     """Return the relieved half's share of the preload, as the core's series has it."""
     y = np.clip(1.0 - np.abs(force) / (_RELIEF * preload), 0.0, 1.0)
@@ -189,12 +180,12 @@ def torque(ctx: Context) -> None:
     ctx.facts["balance_residual_nm"] = None if np.isnan(residual) else residual
 
 
-def _balance(logs: Sequence[Log], actuator: Actuator, constant: Estimate | None) -> TorqueBalance:
+def _balance(logs: Sequence[Log], actuator: Actuator, constant: Estimate | None) -> Balance:
     usable = [log for log in logs if quick(log) and loaded(log)]
     names = _NAMES
     if not usable:
         why = "no log of a motion with current and force on the ram"
-        return TorqueBalance({}, dict.fromkeys(names, why), float("nan"))
+        return Balance({}, dict.fromkeys(names, why), float("nan"))
     value = actuator.parameters.value
     given = 1.5 * value("motor.emf_constant")
     scale = given if constant is None else constant.value
@@ -266,7 +257,7 @@ def nut_loss(speed: Floats, force: Floats, actuator: Actuator) -> Floats:
     return np.asarray(travel * (lost + drag) * np.abs(speed))
 
 
-def _judged(fit: BalanceFit, samples: _Samples, scale: float) -> TorqueBalance:
+def _judged(fit: BalanceFit, samples: _Samples, scale: float) -> Balance:
     levels, reasons = fit.judged(lambda path: _why(path, samples), _NAMES)
     if viscous := levels.get("friction.viscous"):
         # Viscous torque may be half a hundredth of all: what the balance leaves open counts.
@@ -276,7 +267,7 @@ def _judged(fit: BalanceFit, samples: _Samples, scale: float) -> TorqueBalance:
     if opposing is not None and aiding is not None and aiding.value > opposing.value:
         # No screw gives back more than it takes: the difference is noise.
         levels["screw.efficiency_aiding"] = Estimate(opposing.value, aiding.std, aiding.degrees)
-    return TorqueBalance(levels, reasons, fit.residual * scale)
+    return Balance(levels, reasons, fit.residual * scale)
 
 
 def _rms(values: Floats) -> float:

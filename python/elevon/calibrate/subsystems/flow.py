@@ -8,6 +8,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -53,6 +54,7 @@ from elevon.calibrate.subsystems.signals import (
     drive_signals,
     effort_of,
     evenly,
+    excerpts,
     linear,
     with_scale,
 )
@@ -141,10 +143,14 @@ class MachineContext(Context):
         )
         self.subsystems["controller"] = replace(self.subsystems["controller"], reason=why)
 
-    @property
-    def torques(self) -> list[DriveSignals]:
-        """The logs with their effort as the motor's torque [N m], where its scale is known."""
-        return [replace(d, effort=self.effort.scale * d.effort) for d in self.drives]
+    @cached_property
+    def excerpts(self) -> list[DriveSignals]:
+        """What is read of the logs: all but of long ones."""
+        return [part for drive in self.drives for part in excerpts(drive)]
+
+    def torques(self, drives: Sequence[DriveSignals]) -> list[DriveSignals]:
+        """Return logs with their effort as the motor's torque [N m], where its scale is known."""
+        return [replace(d, effort=self.effort.scale * d.effort) for d in drives]
 
 
 def _mechanics(ctx: MachineContext) -> None:
@@ -154,7 +160,9 @@ def _mechanics(ctx: MachineContext) -> None:
         return free_run(drive, bare(ctx.actuator, numbers), drive.effort)[1]
 
     try:
-        ctx.inverse = identify_mechanics(ctx.torques, own_motion, geared=geared(ctx.actuator))
+        ctx.inverse = identify_mechanics(
+            ctx.torques(ctx.excerpts), own_motion, geared=geared(ctx.actuator)
+        )
     except InputError as error:
         ctx.subsystems["mechanics"] = Subsystem(NOT, reason=str(error))
         return
@@ -167,7 +175,7 @@ def _mechanics(ctx: MachineContext) -> None:
 
 def _electrics(ctx: MachineContext) -> None:
     """Resistance, inductance, voltage constant."""
-    cell = identify_torque_constant(ctx.drives, motor_ratio(ctx.actuator))
+    cell = identify_torque_constant(ctx.excerpts, motor_ratio(ctx.actuator))
     result = identify_electrics(ctx.logs)
     part, written = electrics_of(result, cell, ctx.actuator, ctx.effort.unit)
     ctx.subsystems["electrics"] = part
@@ -194,7 +202,7 @@ def _thermal(ctx: MachineContext) -> None:
 
 def _controller(ctx: MachineContext) -> None:
     """Structure and gains of the law, where one explains the effort."""
-    result, why = identify_controller(ctx.drives)
+    result, why = identify_controller(ctx.excerpts)
     part, written, values = controller_of(result, why, ctx.actuator, ctx.effort)
     ctx.commanded = result
     ctx.controller = result if result is not None and result.identified else None
@@ -378,7 +386,7 @@ def validate_subsystems(
     }  # fmt: skip
     errors: list[SignalError] = []
     traces, notes, ways = [], {}, {}
-    for drive in context.torques if context.effort.known else []:
+    for drive in context.torques(context.drives) if context.effort.known else []:
         way = ["driven by its measured effort"]
         measured, simulated, why = _driven(drive, actuator, law, context.effort, way)
         used = drive.good & (drive.time >= SETTLED)

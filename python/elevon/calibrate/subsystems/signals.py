@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -32,6 +32,9 @@ NOISE_SHARE = 0.003
 LOWEST_BAND, HIGHEST_BAND = 0.02, 0.2  # of the sampling rate
 JITTER = 0.3  # of a period: stamps that differ by less are those of a regular clock. ASSUMED
 GAP = 3.0  # periods: a longer pause between two samples is a gap
+#: Samples of a log that are read, and stretches that a longer one is read in: its time and memory
+#: grow no further. ASSUMED: a minute at 1 kHz determines what ten do, but for the root of ten.
+MOST, STRETCHES = 60_000, 6
 REST_SPEED = 0.01  # of the largest speed: below it friction is whatever holds
 
 
@@ -127,6 +130,24 @@ class DriveSignals:
         else:
             return None
         return speed, derivative(speed, self.period)
+
+
+def excerpts(drive: DriveSignals) -> list[DriveSignals]:
+    """Return a log, or stretches spread evenly over it where it has more than `MOST` samples."""
+    count = len(drive.time)
+    if count <= MOST:
+        return [drive]
+    length = MOST // STRETCHES
+    out = []
+    for begin in np.linspace(0, count - length, STRETCHES).astype(int).tolist():
+        series = {
+            item.name: value[begin : begin + length]
+            for item in fields(drive)
+            if isinstance(value := getattr(drive, item.name), np.ndarray)
+        }
+        name = f"{drive.name} from {drive.time[begin]:.4g} s"
+        out.append(replace(drive, name=name, **series))
+    return [replace(item, time=item.time - item.time[0]) for item in out]
 
 
 #: Central difference of the eighth order: within 1 % up to a fifth of the sampling rate, where one
