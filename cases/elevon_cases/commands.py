@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 #: What judges Elevon itself stands outside the package.
 STUDIES = (
     "benchmark-set",
+    "controllers",
     "diagnosis-limits",
     "diagnosis-optimisers",
     "fault-limits",
