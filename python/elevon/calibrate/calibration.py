@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time as clock
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Annotated
@@ -16,7 +15,7 @@ from elevon.calibrate.balance import controller_law, saturated_speed, torque_bal
 from elevon.calibrate.dynamic import Dynamic, dynamic_stage
 from elevon.calibrate.kinematics import KINEMATIC, CommandFit, command_fit
 from elevon.calibrate.model_runs import SpeedRuns
-from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.outcome import Calibration, log_facts
 from elevon.calibrate.plant import (
     Torque,
     accept,
@@ -401,7 +400,6 @@ def calibrate(
     Interrupted
         `progress` returned False.
     """
-    begin = clock.perf_counter()
     if not logs:
         raise InputError("calibration needs at least one log")
     logs = [drive_log(log) for log in logs]
@@ -416,20 +414,15 @@ def calibrate(
     estimates, dynamic = context.accepted, context.dynamic
     fitted = with_values(actuator, estimates, context.followed, context.torque, dynamic)
     errors = held_out(used, actuator, fitted, part(progress, 0.8, 1.0)) if hold_out else ()
-    context.go(1.0)
-    return Calibration(
-        actuator=fitted,
-        before=actuator,
-        logs=log_facts(
-            logs, brake={log.name: log.brake.known for log in logs}, skipped_s=skipped,
-            warnings={log.name: log.warnings for log in logs},
-        ),
-        parameters=by_path(estimates),
-        undetermined=undetermined(list(context.levels.values()), estimates, free, dynamic),
-        facts={**_facts(context), **_of_runs(dynamic), "held_out": errors},
-        findings=_findings(context),
-        wall_s=clock.perf_counter() - begin,
+    not_taken = undetermined(list(context.levels.values()), estimates, free, dynamic)
+    known = log_facts(
+        logs, brake={log.name: log.brake.known for log in logs}, skipped_s=skipped,
+        warnings={log.name: log.warnings for log in logs},
     )  # fmt: skip
+    facts = {**_facts(context), **_of_runs(dynamic), "held_out": errors}
+    return context.calibration(
+        fitted, estimates, not_taken, logs=known, facts=facts, findings=_findings(context)
+    )
 
 
 def _facts(context: DriveContext) -> dict[str, object]:

@@ -10,7 +10,6 @@ logs, fits, holds logs out and validates in its manner.
 from __future__ import annotations
 
 import os
-import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -223,7 +222,6 @@ def calibrate_any(logs: Sequence[Log], request: Request) -> Calibration:
     from elevon.calibrate.subsystems.flow import calibrate_machine, identifiable, identify
     from elevon.calibrate.subsystems.record import NOT, of_registers
 
-    begin = clock.perf_counter()
     actuator = request.actuator
     way, error = _way(logs, actuator)
     machine = None
@@ -243,7 +241,7 @@ def calibrate_any(logs: Sequence[Log], request: Request) -> Calibration:
         )
     if machine is not None and (way is None or machine.settles(request.free)):
         _check_machine(request)
-        return calibrate_machine(machine, request.free, begin=begin)
+        return calibrate_machine(machine, request.free)
     if way is None:
         assert error is not None
         raise error
@@ -254,7 +252,7 @@ def calibrate_any(logs: Sequence[Log], request: Request) -> Calibration:
         explained = _explained(result)
         if explained < EXPLAINED and machine.subsystems["mechanics"].status != NOT:
             machine.without_controller(explained)
-            return calibrate_machine(machine, begin=begin)
+            return calibrate_machine(machine)
     parts = of_registers(result.estimates, result.undetermined)
     if machine is not None:
         parts |= {name: machine.subsystems[name] for name in ("electrics", "transmission")}

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats, Ints
-from elevon.calibrate.outcome import Calibration, LogFacts, by_path
+from elevon.calibrate.outcome import Calibration, LogFacts
 from elevon.data import read_table
 from elevon.errors import FormatError, InputError, RangeError
 from elevon.estimate import Estimate
@@ -309,7 +309,7 @@ def run_drops(path: Path, actuator: Actuator) -> Calibration:
         actuator=actuator.with_values(values, source="calibration"),
         before=actuator,
         logs=(LogFacts(path.name, len(drops), math.nan),),
-        parameters=by_path(result.estimates),
+        parameters={item.path: item for item in result.estimates},
         facts=facts,
         findings=(f"{len(slips)} slips mended; {facts['assumed']}",),
     )

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from elevon.actuator import Actuator
+from elevon.calibrate.write import actuator_name
 from elevon.compare import CUTOFF_HZ, GRID_HZ, RATES, SIGNALS, compared_rate, filtered
 from elevon.errors import InputError, SimulationError
 from elevon.estimate.held_out import folds
@@ -440,17 +441,12 @@ def write_fit(path: str | os.PathLike[str], fit: LowFit, *, force: bool = False)
     target = Path(path).expanduser()
     return write_set(
         target,
-        name=_name(target.stem),
+        name=actuator_name(target.stem),
         changes=fitted_parameters(fit),
         base=base_reference(fit.before.path, fit.before.name, target),
         title=f"{fit.before.title or fit.before.name}, reduced-order model fitted",
         force=force,
     )
-
-
-def _name(stem: str) -> str:
-    plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
-    return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"
 
 
 def lowfit_report(fit: LowFit, actuator: str, *, date: str | None = None) -> Report:

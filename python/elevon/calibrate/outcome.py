@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from elevon.actuator import Actuator
-from elevon.arrays import Floats
 from elevon.calibrate.validation import Validation
 from elevon.errors import unknown
 from elevon.estimate import Estimate
+from elevon.logs.log import Log
 from elevon.number_text import estimate_row
 from elevon.plain import REMAINDER, STORED, Plain, in_unit, key, plain
 from elevon.report.cards import Html, badge, card, table
@@ -22,19 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from elevon.report import Report
-
-
-class _Log(Protocol):
-    """What an outcome asks of a log."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def time(self) -> Floats: ...
-
-    @property
-    def period(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -175,12 +162,7 @@ def _listed(names: Sequence[str], most: int = 6) -> str:
     return ", ".join(names[:most]) + more if names else "nothing"
 
 
-def by_path(estimates: Iterable[Estimate]) -> dict[str, Estimate]:
-    """Return estimates by their paths."""
-    return {item.path: item for item in estimates}
-
-
-def log_facts(logs: Sequence[_Log], **more: Mapping[str, object]) -> tuple[LogFacts, ...]:
+def log_facts(logs: Sequence[Log], **more: Mapping[str, object]) -> tuple[LogFacts, ...]:
     """Return what is to be reported of logs; of each key in `more`, the entry of a log's name."""
     return tuple(
         LogFacts(

@@ -164,7 +164,7 @@ def write_calibration(
         Whether an existing file may be replaced.
     """
     target = Path(path).expanduser()
-    name = _name(target.stem)
+    name = actuator_name(target.stem)
     text = set_text(
         result,
         name=name,
@@ -174,6 +174,7 @@ def write_calibration(
     return write_text(target, text, force=force)
 
 
-def _name(stem: str) -> str:
+def actuator_name(stem: str) -> str:
+    """Return the name of an actuator that is written to a file of this stem."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in stem)
     return plain if plain and plain[0].isalnum() else f"actuator-{plain.strip('-._')}"

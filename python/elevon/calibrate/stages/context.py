@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import time as clock
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
 from typing import Any, Generic, TypeVar
@@ -13,6 +14,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
 from elevon.calibrate.named import named
+from elevon.calibrate.outcome import Calibration, log_facts
 from elevon.data import packaged_toml
 from elevon.errors import InputError, Interrupted
 from elevon.estimate import Estimate
@@ -184,6 +186,8 @@ class Context:
         What a value stands on.
     facts : dict of str to object
         What else is known, plain types.
+    begin : float
+        Of the work, by the clock of this process [s].
     """
 
     logs: Sequence[Log]
@@ -195,6 +199,7 @@ class Context:
     reasons: dict[str, str] = field(default_factory=dict, init=False)
     given: dict[str, tuple[str, ...]] = field(default_factory=dict, init=False)
     facts: dict[str, Any] = field(default_factory=dict, init=False)
+    begin: float = field(default_factory=clock.perf_counter, init=False)
 
     def go(self, fraction: float) -> None:
         """Report progress; stop where it says so."""
@@ -247,6 +252,33 @@ class Context:
         """Return the actuator as the stages so far have it, for what is only read from it."""
         values: dict[str, str | float] = {p: item.value for p, item in self.levels.items()}
         return self.actuator.with_values(values, source="calibration")
+
+    def calibration(
+        self,
+        fitted: Actuator,
+        estimates: Iterable[Estimate],
+        undetermined: Mapping[str, str],
+        **more: Any,
+    ) -> Calibration:
+        """Return the answer, with the logs, the actuator before and the time it took.
+
+        Parameters
+        ----------
+        fitted : Actuator
+            With the estimates.
+        estimates : iterable of Estimate
+            What is determined.
+        undetermined : mapping of str to str
+            What is not, and why.
+        **more
+            Other fields of the answer.
+        """
+        self.go(1.0)
+        given = {"before": self.actuator, "logs": log_facts(self.logs), "facts": self.facts} | more
+        return Calibration(
+            actuator=fitted, parameters={item.path: item for item in estimates},
+            undetermined=undetermined, wall_s=clock.perf_counter() - self.begin, **given,
+        )  # fmt: skip
 
     def answer(self, free: Sequence[str] | None) -> tuple[list[Estimate], dict[str, str]]:
         """Return the estimates, those requested only, and the rest with its reasons.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Sequence
 
 import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
-from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.stages import loops, screw
 from elevon.calibrate.stages.context import Context, motor_ratio, run_stages, stages_of
 from elevon.calibrate.stages.drive import drive
@@ -275,7 +274,6 @@ def calibrate_parts(
     Interrupted
         `progress` returned False.
     """
-    begin = clock.perf_counter()
     if not logs:
         raise InputError("calibration needs at least one log")
     if fidelity not in {None, *_FIDELITIES}:
@@ -286,16 +284,8 @@ def calibrate_parts(
     _run(context)
     estimates, undetermined = context.answer(free)
     values: dict[str, str | float] = {item.path: item.value for item in estimates}
-    context.go(1.0)
-    return Calibration(
-        actuator=actuator.with_values(values, source="calibration"),
-        before=actuator,
-        logs=log_facts(context.logs),
-        parameters=by_path(estimates),
-        undetermined=undetermined,
-        facts=context.facts,
-        wall_s=clock.perf_counter() - begin,
-    )
+    fitted = actuator.with_values(values, source="calibration")
+    return context.calibration(fitted, estimates, undetermined)
 
 
 def _run(context: Context) -> None:

@@ -5,7 +5,6 @@ None waits for another: a controller that nobody knows leaves the mechanics as t
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
@@ -14,7 +13,7 @@ import numpy as np
 
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
-from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.stages.context import (
     Context,
     Stage,
@@ -248,9 +247,7 @@ def identify(
     return context
 
 
-def calibrate_machine(
-    context: MachineContext, free: Sequence[str] | None = None, *, begin: float | None = None
-) -> Calibration:
+def calibrate_machine(context: MachineContext, free: Sequence[str] | None = None) -> Calibration:
     """Return the calibration of a machine from its subsystems alone.
 
     Raises
@@ -258,7 +255,6 @@ def calibrate_machine(
     InputError
         Not what was requested, or nothing is determined.
     """
-    begin = clock.perf_counter() if begin is None else begin
     for path in free or ():
         record_of(context.actuator.wiring, path, "--free")
     estimates = [item for item in context.estimates if free is None or item.path in free]
@@ -280,19 +276,11 @@ def calibrate_machine(
     table = None if free is not None else law_table(context)
     if table is not None:
         fitted = replace(fitted, validation={**(fitted.validation or {}), "law": table})
-    context.go(1.0)
-    return Calibration(
-        actuator=fitted,
-        before=context.actuator,
-        logs=log_facts(context.logs),
-        parameters=by_path(estimates),
-        undetermined={} if free is not None else context.reasons,
-        findings=_findings(context),
+    return context.calibration(
+        fitted, estimates, {} if free is not None else context.reasons,
+        findings=_findings(context), promise=validation, validation=validation,
         facts={"subsystems": {name: context.subsystems[name] for name in NAMES}},
-        promise=validation,
-        validation=validation,
-        wall_s=clock.perf_counter() - begin,
-    )
+    )  # fmt: skip
 
 
 def _findings(context: MachineContext) -> tuple[str, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -12,7 +11,7 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.calibrate.named import named
-from elevon.calibrate.outcome import Calibration, by_path, log_facts
+from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.stages.closed_loop.fit import (
     DECIDED,
     Fitted,
@@ -294,7 +293,6 @@ def calibrate_loop(
     Interrupted
         `progress` returned False.
     """
-    begin = clock.perf_counter()
     _check(logs, actuator, structure)
     late = list(logs) if transient is None else [log.after(transient) for log in logs]
     context = LoopContext(
@@ -303,20 +301,10 @@ def calibrate_loop(
     )  # fmt: skip
     run_stages(LOOP_STAGES, context, 0.0, 1.0)
     fitted = context.fitted
-    context.go(1.0)
-    determined = any(item.in_set for item in context.estimates)
-    return Calibration(
-        actuator=_with(context.servo, fitted, context.chosen.structure, context.reasons)
-        if determined
-        else actuator,
-        before=actuator,
-        logs=log_facts(context.logs),
-        parameters=by_path(context.estimates),
-        undetermined=context.reasons,
-        facts=context.facts,
-        promise=context.promise,
-        wall_s=clock.perf_counter() - begin,
-    )
+    given = actuator
+    if any(item.in_set for item in context.estimates):
+        given = _with(context.servo, fitted, context.chosen.structure, context.reasons)
+    return context.calibration(given, context.estimates, context.reasons, promise=context.promise)
 
 
 @dataclass(eq=False, kw_only=True)
