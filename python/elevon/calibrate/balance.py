@@ -1,10 +1,19 @@
-"""Torque balance as a regression on noise-free regressors.
+"""Torque balance and the speed controller's law, each a regression on noise-free regressors.
 
-Speed and acceleration come from the motor's angle (`elevon.calibrate.balance`), so that all the
-noise is in the current, the left-hand side, and least squares is unbiased. No simulation, no
-controller, no command enters
+The motor's encoder has 2^24 counts a turn: speed and acceleration taken from its angle are nearly
+free of noise, so that all the noise is in the current, the left-hand side, and least squares is
+unbiased. Every signal goes through one Gaussian, and lags pass everything alike: what the kernel
+does to the left-hand side it does to the right-hand side too. No simulation enters.
 
-    k_t i = J dw/dt + C w + (F + T_brake) sgn w.
+    k_t i = J dw/dt + C w + (F + T_brake) sgn w
+    k_t i_ref = K_p e + K_i int e dt + K_d (dw_ref/dt - dw/dt),   e = w_ref - w
+
+In the law the motion has a coefficient of its own in the first term and in the last. A set point
+that goes by stairs (counts of an encoder, a slower position loop) makes the derivative branch
+spike; the log's samples stand in step with the drive and catch those spikes too often or too
+seldom, and what the drive reads a tick late looks like a derivative or a set-point weight. All that
+lands on the set point's slope and on the motion's own term; the gains are read from the error and
+from the motion's slope, which is smooth.
 """
 
 from __future__ import annotations

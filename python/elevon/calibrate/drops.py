@@ -1,4 +1,13 @@
-"""A table of hung weights: stiffness and dead zone of the transmission."""
+"""A table of hung weights: stiffness and dead zone of the transmission.
+
+    loss = dead zone + load / stiffness (+ an offset for each further group of drops)
+
+The load is set and exact, the scatter is in the angle: so the loss is regressed on the load. Drops
+of one weight share their errors and count as one block. Slips of the pen are found from the table
+itself: the encoder came back to the same few end positions while the motor never stopped twice at
+the same place; every weight pulls to the same side; the printed loss is the distance between the
+two positions of its row.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Logs' tests on a model at many points of a fit at once, as residuals of what moves."""
+"""Logs' tests on a model at many points of a fit at once, as residuals of what moves.
+
+`SpeedRuns` drives the actuator with each log's measured set point of the speed. That cuts the
+position loop open: the command need not be known, positions do not drift, and backlash has no part.
+What is compared is the speed and the torque current that the model's speed controller, drive, motor
+and friction make of it.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Regression coefficients become parameters of the model, with their intervals and conditions."""
+"""Regression coefficients as parameters of the model, and which of them the file accepts."""
 
 from __future__ import annotations
 

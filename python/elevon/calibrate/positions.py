@@ -1,7 +1,8 @@
-"""Backlash, encoder gain and offset from the two positions alone.
+"""What the two positions and the set points show: backlash, encoder, speed sensor, limits.
 
-The encoder shows the motor's angle over the ratio, after the backlash: one equation, no
-friction, inertia or controller in it. All samples count, those inside the gap too.
+The encoder shows the motor's angle over the ratio, after the backlash: one equation, no friction,
+inertia or controller in it. All samples count, those inside the gap too. A campaign may change the
+backlash between its logs: then each log has its own.
 """
 
 from __future__ import annotations

@@ -14,8 +14,6 @@ from elevon.report import Check, Report, ReportTable
 from elevon.report.figures import COLOURS, new_figure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from matplotlib.figure import Figure
 
     from elevon.arrays import Floats

@@ -1,4 +1,9 @@
-"""A model held against logs: the same command, its own closed loop, the errors signal by signal."""
+"""A model held against logs: the same command, its own closed loop, the errors signal by signal.
+
+Of an actuator with a control unit of its own the recorded inputs are replayed: command, load and
+the stand's settings come from the log; everything else that the log shows and the model has is
+compared, role by role.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A calibration written as a parameter set: what changed, from which logs, and what it was."""
+"""A calibration as an actuator file: what changed, from which logs, and its thresholds."""
 
 from __future__ import annotations
 

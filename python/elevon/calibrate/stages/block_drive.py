@@ -1,9 +1,12 @@
-"""Motor constants while the drive pushes: balance of voltage, or of power.
+"""Motor and train while the drive pushes: balances of voltage or power, and of torque.
 
 ``V = 2 k w + (2 (R + R_on) + c p |w| L) i + (1 - d) V_f`` between the demanded voltage and the
 current of the pair, the commutations a resistance that grows with speed. Where no voltage is
 recorded, ``P = 2 k w i + 2 (R + R_on) i^2 + (1 - d) V_f |i|`` between the link's power and the same
 current. The pair's current is the line's less what the third phase draws (`third_phase`).
+
+``(k_T i - J dw/dt)/r + F = d F(v) + d (1/eta(F) - 1)|F|`` with the direction ``d`` and the axial
+load ``F`` towards extension; ``eta`` is the gear's times the screw's, which falls with the load.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""What the stages of a calibration share: logs, the actuator before, what is determined so far."""
+"""What the stages of a calibration share: logs, the actuator before, what is determined so far.
+
+Balances need a log on the clock of what they balance, with the motor's speed, all channels smoothed
+alike, and the samples that count.
+"""
 
 from __future__ import annotations
 

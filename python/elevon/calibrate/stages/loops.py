@@ -2,6 +2,12 @@
 
 ``y = K e + K z (integral of e)`` holds exactly wherever the output is not limited; each stretch
 between two limits begins with an integral of its own.
+
+Where no set point was logged, a cascade with its speed fed forward is one PID: with
+``q = N x_c - theta`` (command less position, at the motor) the torque that it asks for is
+``K q' + (K k + K/T_i) q + (K k/T_i) (integral of q)`` with ``k = k_v/N``. The speed gain shows
+itself; ``k`` and ``1/T_i`` are the roots of one polynomial and change places without any change of
+the current.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""Motions of an actuator with a control unit: under its own drive, or moved by a rig."""
+"""Motions of an actuator with a control unit, and what a rig that moves its ram shows of friction.
+
+At a constant speed the load cell shows ``d F(v) - m g`` (d: direction), and what repeats over the
+pitch. Free fall (the stages apart) shows the screw side, modified free fall (the motor turns, its
+brake open) the whole train, and a set brake what it holds.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Torque balance of a preloaded screw: friction, preload, efficiency in each direction, inertia.
+"""A preloaded screw: motor constants, load side, friction, preload, efficiencies, inertia.
 
 ``k_T i = J dw/dt + C w + s (T_d + b(F) T_pr) + r F + s L(F)`` with ``s`` the sign of the motion,
 ``T_pr = F_pr r (1/eta - eta')``, ``L = (1/eta - 1) r |F|`` where the force ``F`` on the nut opposes

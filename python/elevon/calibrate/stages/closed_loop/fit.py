@@ -1,4 +1,10 @@
-"""Search, choice of the controller's structure, and the final fit."""
+"""Search, choice of the controller's structure, and the final fit.
+
+A search leaves out friction that grows with the torque, and how late the drive acts. Both bias
+gains, inertia and limits where they are missing: a screw's friction eats a share of the torque at
+the current's limit, so that a model without it lowers the limit; a drive that reads, waits and
+holds acts some milliseconds late, which the model's step stands for.
+"""
 
 from __future__ import annotations
 

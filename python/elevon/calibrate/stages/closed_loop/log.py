@@ -1,4 +1,4 @@
-"""A log as the closed loop needs it: what was demanded, and whatever of the motion was recorded."""
+"""A log as the closed loop needs it, and what may be fitted to it: servo, delays, offsets."""
 
 from __future__ import annotations
 

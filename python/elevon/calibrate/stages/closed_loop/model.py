@@ -1,4 +1,4 @@
-"""The servo's own closed loop on recorded demands: many parameter vectors, one batch."""
+"""The servo's own closed loop on recorded demands, and where a search of it begins."""
 
 from __future__ import annotations
 

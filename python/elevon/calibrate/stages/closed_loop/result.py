@@ -1,4 +1,4 @@
-"""Calibration in closed loop: logs and datasheet numbers to an actuator file with intervals."""
+"""Calibration in closed loop: intervals, what is predicted of logs left out, the actuator file."""
 
 from __future__ import annotations
 
