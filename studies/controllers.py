@@ -104,7 +104,7 @@ def study_controllers(
     truth[:, 3] *= rng.choice([-1.0, 1.0], fits)
     commands, seen, efforts = _logs(drives.tolist(), truth, rng)
     hits, widths = np.full((fits, 4), np.nan), np.full((fits, 4), np.nan)
-    time = PERIOD * np.arange(len(commands))
+    time: Floats = PERIOD * np.arange(len(commands), dtype=np.float64)
     for k in range(fits):
         if progress is not None and progress(k / fits) is False:
             raise Interrupted("study stopped")

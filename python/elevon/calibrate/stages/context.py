@@ -18,7 +18,8 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Bools, Floats
 from elevon.calibrate.named import named
-from elevon.calibrate.outcome import Calibration, log_facts
+from elevon.calibrate.outcome import Calibration, LogFacts, log_facts
+from elevon.calibrate.validation import Validation
 from elevon.data import packaged_toml
 from elevon.errors import InputError, Interrupted
 from elevon.estimate import Estimate
@@ -262,9 +263,14 @@ class Context:
         fitted: Actuator,
         estimates: Iterable[Estimate],
         undetermined: Mapping[str, str],
-        **more: Any,
+        *,
+        logs: tuple[LogFacts, ...] | None = None,
+        facts: Mapping[str, object] | None = None,
+        findings: tuple[str, ...] = (),
+        promise: Validation | None = None,
+        validation: Validation | None = None,
     ) -> Calibration:
-        """Return the answer, with the logs, the actuator before and the time it took.
+        """Return the answer, with the actuator before and the time it took.
 
         Parameters
         ----------
@@ -274,14 +280,16 @@ class Context:
             What is determined.
         undetermined : mapping of str to str
             What is not, and why.
-        **more
-            Other fields of the answer.
+        logs, facts, findings, promise, validation
+            As in `Calibration`; by default the logs' names and rates, and what the stages noted.
         """
         self.go(1.0)
-        given = {"before": self.actuator, "logs": log_facts(self.logs), "facts": self.facts} | more
         return Calibration(
-            actuator=fitted, parameters={item.path: item for item in estimates},
-            undetermined=undetermined, wall_s=clock.perf_counter() - self.begin, **given,
+            actuator=fitted, before=self.actuator, findings=findings, promise=promise,
+            logs=log_facts(self.logs) if logs is None else logs, validation=validation,
+            parameters={item.path: item for item in estimates}, undetermined=undetermined,
+            facts=self.facts if facts is None else facts,
+            wall_s=clock.perf_counter() - self.begin,
         )  # fmt: skip
 
     def answer(self, free: Sequence[str] | None) -> tuple[list[Estimate], dict[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -140,7 +141,7 @@ def excerpts(drive: DriveSignals) -> list[DriveSignals]:
     length = MOST // STRETCHES
     out = []
     for begin in np.linspace(0, count - length, STRETCHES).astype(int).tolist():
-        series = {
+        series: dict[str, Any] = {
             item.name: value[begin : begin + length]
             for item in fields(drive)
             if isinstance(value := getattr(drive, item.name), np.ndarray)
