@@ -78,6 +78,33 @@ class VersionError(FormatError):
     """A file of our own whose layout this version does not read."""
 
 
+class BudgetError(InputError):
+    """A run that would take longer than it may.
+
+    Attributes
+    ----------
+    estimate_s : float
+        Processor time that it would take, in s.
+    bytes : int
+        Memory of its recording.
+    """
+
+    def __init__(self, message: str, estimate_s: float = float("nan"), memory: int = 0) -> None:
+        super().__init__(message)
+        self.estimate_s = estimate_s
+        self.bytes = memory
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the JSON form."""
+        return {
+            "status": "refused",
+            "estimate_s": self.estimate_s,
+            "bytes": self.bytes,
+            "option": "--budget",
+            "message": str(self),
+        }
+
+
 class OutputError(InputError, OSError):
     """An output that cannot be written."""
 

@@ -25,7 +25,7 @@ from elevon.memory import available_bytes, format_bytes
 from elevon.parameters.records import record_of
 from elevon.scenario import compile_scenario
 from elevon.simulate.acting import Notice, not_acting, report
-from elevon.simulate.batch import checked_threads, simulate_prepared
+from elevon.simulate.batch import checked_threads, duration_text, simulate_prepared
 
 if TYPE_CHECKING:
     from elevon.campaign.folder import CampaignWork
@@ -244,7 +244,7 @@ class Cost:
 
     def __str__(self) -> str:
         return (
-            f"{self.runs} runs in {self.blocks} block(s); about {_duration_text(self.seconds)}, at "
+            f"{self.runs} runs in {self.blocks} block(s); about {duration_text(self.seconds)}, at "
             f"most {format_bytes(self.memory)} of memory at a time, {format_bytes(self.disk)} of "
             "data"
         )
@@ -315,9 +315,3 @@ def _pilot_seconds(
 def _pilot_run(prepared: Any) -> Any:
     duration = min(prepared.core["duration"], _PILOT_STEPS * prepared.step)
     return replace(prepared, core={**prepared.core, "duration": duration})
-
-
-def _duration_text(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{seconds:.2g} s"
-    return f"{seconds / 60.0:.2g} min" if seconds < 5400.0 else f"{seconds / 3600.0:.3g} h"

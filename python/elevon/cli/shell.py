@@ -29,6 +29,7 @@ from elevon.cli.options import (
     own_parameters,
 )
 from elevon.cli.output import print_json, progress_bar, say
+from elevon.errors import BudgetError
 from elevon.files import check_output
 from elevon.report import Report
 from elevon.results import Result
@@ -175,7 +176,12 @@ class TerminalCommand:
             if report is not None:
                 check_output(report, force=force)
             call = None if door is None else DoorCall(door, of_door, options, self.working)
-            result = self._answer(call, {name: options[name] for name in names})
+            try:
+                result = self._answer(call, {name: options[name] for name in names})
+            except BudgetError as error:
+                if options["json"]:  # the one error with figures that a program goes on from
+                    print_json(error.to_dict())
+                raise
             if report is not None and result.page is not None:
                 page = result.page(date=options["date"]) if "date" in extra else result.page()
                 say(f"report: {page.save(report, force=force)}")

@@ -17,7 +17,7 @@ from elevon.parameters.records import positions
 from elevon.scenario import Scenario
 from elevon.scenario.compile import signal_records
 from elevon.simulate.acting import report
-from elevon.simulate.batch import simulate_prepared
+from elevon.simulate.batch import BUDGET, check_budget, simulate_prepared
 from elevon.simulate.prepare import Prepared, Run, prepare
 
 #: Instants from the run's beginning [s] and values there; straight lines between.
@@ -429,9 +429,9 @@ def run_all(
     if len(fidelities) > 1:
         raise InputError("runs of one batch have one fidelity")
     ready = [experiment._varied(variant) for experiment, variant in runs]
-    results = simulate_prepared(
-        ready, fidelity=fidelities.pop(), progress=progress, threads=threads
-    )
+    fidelity = fidelities.pop()
+    check_budget(ready, fidelity, BUDGET)
+    results = simulate_prepared(ready, fidelity=fidelity, progress=progress, threads=threads)
     return [experiment._read(r) for (experiment, _), r in zip(runs, results, strict=True)]
 
 

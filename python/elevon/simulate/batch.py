@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
-from elevon.errors import ArgumentTypeError, DivergedError, InputError, Interrupted, SimulationError
+from elevon.errors import (
+    ArgumentTypeError,
+    BudgetError,
+    DivergedError,
+    InputError,
+    Interrupted,
+    RangeError,
+    SimulationError,
+)
 from elevon.faults import Fault
 from elevon.memory import check_memory
-from elevon.option import Option
+from elevon.option import Option, Quantity
 from elevon.recording import Clock, Recording
 from elevon.seam import CoreResult
 from elevon.simulate.acting import report
@@ -26,8 +36,18 @@ from elevon.simulate.prepare import (
     prepare_named,
 )
 from elevon.simulate.result import build_recording
+from elevon.units import parse_quantity
 
 Progress = Callable[[float], Any]
+
+BUDGET = 600.0
+"""Processor time that a run may take, in s, unless more is allowed; ASSUMED: somebody waits."""
+
+SLOWEST_STEP = 1e-6
+"""Processor time in s that no solver step takes; ASSUMED: every option at once takes 0.29 us."""
+
+PILOT_STEPS = 200_000
+"""Steps by which the time of the others is estimated: some 10 to 60 ms."""
 
 
 def simulate(
@@ -43,6 +63,7 @@ def simulate(
     number: int = 0,
     lanes: str = "auto",
     strict: bool = False,
+    budget: Quantity = BUDGET,
     progress: Progress | None = None,
 ) -> Recording:
     """Simulate one run.
@@ -74,6 +95,8 @@ def simulate(
         processor has them; the result does not depend on it.
     strict : bool
         What is set where it has no effect is an error, not a warning.
+    budget : float or str
+        Processor time that the run may take, in s, or such as ``"2 h"``.
     progress : callable, optional
         Called some ten times a second with the done fraction; returning False interrupts.
 
@@ -88,6 +111,8 @@ def simulate(
         Anything in actuator, scenario or record that cannot be; place, value, limit are named.
     NotActingError
         `strict`, and something set has no effect.
+    BudgetError
+        By a pilot of its first steps the run would take longer than `budget`.
     DivergedError
         The run left the finite numbers; time and signal are named.
     Interrupted
@@ -106,7 +131,7 @@ def simulate(
     prepared = [prepare(run, fidelity, record, features)]
     report([prepared[0].notices], strict=strict)
     recording = _simulated(
-        [run], prepared, fidelity=fidelity, threads=1, lanes=lanes, progress=progress
+        [run], prepared, fidelity=fidelity, threads=1, lanes=lanes, budget=budget, progress=progress
     )[0]
     if recording.status == "diverged":
         raise DivergedError(
@@ -126,6 +151,7 @@ def simulate_batch(
     threads: int | None = None,
     lanes: str = "auto",
     strict: bool = False,
+    budget: Quantity = BUDGET,
     progress: Progress | None = None,
 ) -> list[Recording]:
     """Simulate many runs, in SIMD batches on several threads.
@@ -140,6 +166,8 @@ def simulate_batch(
         As for `simulate`; what has no effect is reported once, however many runs set it.
     threads : int, optional
         Default, and most: one a core.
+    budget : float or str
+        Processor time that each run may take, in s, or such as ``"2 h"``.
 
     Returns
     -------
@@ -151,6 +179,8 @@ def simulate_batch(
     ------
     InputError
         No runs; or wrong input, with the run named; or more memory needed than there is.
+    BudgetError
+        By a pilot a run would take longer than `budget`.
     Interrupted
         `progress` returned False.
     """
@@ -166,7 +196,13 @@ def simulate_batch(
     prepared = [prepare_named(run, fidelity, record, len(runs) > 1, features) for run in runs]
     report([item.notices for item in prepared], strict=strict)
     return _simulated(
-        runs, prepared, fidelity=fidelity, threads=threads, lanes=lanes, progress=progress
+        runs,
+        prepared,
+        fidelity=fidelity,
+        threads=threads,
+        lanes=lanes,
+        budget=budget,
+        progress=progress,
     )
 
 
@@ -177,9 +213,11 @@ def _simulated(
     fidelity: str,
     threads: int | None,
     lanes: str,
+    budget: float | str,
     progress: Progress | None,
 ) -> list[Recording]:
     check_memory(sum(item.bytes for item in prepared), f"the recordings of {len(runs)} run(s)")
+    check_budget(prepared, fidelity, budget)
     results: list[Recording | None] = [None] * len(runs)
     done = 0
     for group in _groups(prepared):
@@ -218,6 +256,54 @@ def simulate_prepared(
             results[index] = result
         done += len(group)
     return [results[index] for index in range(len(prepared))]
+
+
+def check_budget(prepared: Sequence[Prepared], fidelity: str, budget: float | str) -> None:
+    """Raise `BudgetError` where the longest of some runs would take longer than it may.
+
+    Parameters
+    ----------
+    prepared : sequence of Prepared
+        The runs.
+    fidelity : str
+        Of all of them.
+    budget : float or str
+        Processor time of a run, in s, or such as ``"2 h"``.
+    """
+    allowed = parse_quantity(budget, "s", "budget")
+    if not allowed > 0.0:
+        raise RangeError(f"budget = {budget}: must be above 0 s")
+    longest = max(prepared, key=lambda item: item.core["duration"] / item.step)
+    steps = longest.core["duration"] / longest.step
+    if steps * SLOWEST_STEP <= allowed:
+        return
+    seconds = steps * pilot_seconds(longest, fidelity)
+    if seconds > allowed:
+        raise BudgetError(
+            f"{steps:.3g} solver steps of {longest.step:g} s would take {duration_text(seconds)} "
+            f"of one core, and a run may take {duration_text(allowed)}: take a longer step "
+            f"({fidelity}.step, solver.step), simulate less time, or allow more "
+            f"(--budget '{math.ceil(1.2 * seconds / 3600.0)} h', in Python budget=)",
+            seconds,
+            longest.bytes,
+        )
+
+
+def pilot_seconds(prepared: Prepared, fidelity: str) -> float:
+    """Return the processor time of a solver step, by a run's first steps."""
+    duration = min(prepared.core["duration"], PILOT_STEPS * prepared.step)
+    pilot = replace(prepared, core={**prepared.core, "duration": duration})
+    start = time.process_time()
+    (result,) = _run_core([pilot], fidelity, 1, "auto", lambda _: True)
+    return (time.process_time() - start) / max(int(result["steps"]), 1)
+
+
+def duration_text(seconds: float) -> str:
+    """Return a time for the reader: ``3.2 min``."""
+    for unit, size in (("s", 1.0), ("min", 60.0), ("h", 3600.0), ("days", 86400.0)):
+        if seconds < 90.0 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds / 3.15576e7:.3g} years"
 
 
 #: More threads than this are no wish but a slip.
