@@ -294,7 +294,7 @@ def pilot_seconds(prepared: Prepared, fidelity: str) -> float:
     duration = min(prepared.core["duration"], PILOT_STEPS * prepared.step)
     pilot = replace(prepared, core={**prepared.core, "duration": duration})
     start = time.process_time()
-    (result,) = _run_core([pilot], fidelity, 1, "auto", lambda _: True)
+    (result,) = run_core([pilot], fidelity, 1, "auto", lambda _: True)
     return (time.process_time() - start) / max(int(result["steps"]), 1)
 
 
