@@ -17,7 +17,7 @@ from elevon.faults.catalogue import catalogue
 from elevon.recording import Recording
 from elevon.safety import Hazard, Watched, campaign, lasting, safety
 from elevon.safety.gear import ENVIRONMENTS, GearRow, population
-from elevon.safety.gear_hazards import HAZARDS, RECORD
+from elevon.safety.gear_hazards import HAZARDS, RECORD, distances, limits
 from elevon.safety.hazards import observe
 from elevon.safety.reasons import reason
 from elevon.safety.rows import Failure, failures
@@ -236,3 +236,23 @@ def test_the_whole_campaign() -> None:
     result = safety(elevon.Actuator.load(NAME), seed=5)
     failed = [check.name for check in result.checks if not check.passed]
     assert [name for name in failed if "mean of a flight hour" not in name] == []
+
+
+def test_distances_from_limits() -> None:
+    """A current that nearly warns, a fall nearly too long, a supply that nearly fails."""
+    bounds = limits(elevon.Actuator.load(NAME))
+
+    def nearest(**signals: Any) -> tuple[float, str]:
+        values = {name: np.zeros_like(TIME) for name in NAMES} | {"supply_voltage": 28.0 + 0 * TIME}
+        values |= {name: np.broadcast_to(value, TIME.shape) for name, value in signals.items()}
+        return min((x, name) for name, x in distances(Watched(TIME, values, IDLE, "ok", bounds)))
+
+    assert nearest()[0] > 0.5
+    pushing = np.where((TIME > 2.0) & (TIME < 2.6), 0.95 * bounds["drag_extension"], 0.0)
+    assert nearest(current_mean=pushing) == (pytest.approx(0.05), "current")
+    assert nearest(current_mean=np.where(TIME < 0.2, pushing.max(), 0.0))[0] > 0.5
+    assert nearest(supply_voltage=28.0 - 15.0 * (TIME > 3.0)) == (pytest.approx(1 / 12), "voltage")
+    assert nearest(state=np.where(TIME < 9.9, 5.0, 4.0)) == (pytest.approx(0.01, abs=0.005), "time")
+    slow = 1.02 * bounds["stall_speed"]
+    assert nearest(state=1.0, brake_released=1.0, motor_speed=slow) == (
+        pytest.approx(0.02), "force")  # fmt: skip

@@ -167,8 +167,18 @@ def end(run: Watched) -> str:
 
 def limits(actuator: Actuator) -> dict[str, float]:
     """Return the unit's limits that decide an outcome, by the parameter's name."""
-    names = ("drag_extension", "drag_retraction", "overcurrent", "undervoltage", "overvoltage",
-             "logic_voltage", "motion_timeout", "fall_time", "stall_speed")  # fmt: skip
+    names = (
+        "drag_extension",
+        "drag_retraction",
+        "drag_time",
+        "overcurrent",
+        "undervoltage",
+        "overvoltage",
+        "logic_voltage",
+        "motion_timeout",
+        "fall_time",
+        "stall_speed",
+    )
     return {name: actuator.parameters.value(f"control.{name}") for name in names}
 
 
@@ -178,13 +188,16 @@ def distances(run: Watched) -> Iterator[tuple[str, float]]:
     Current, voltage and time against the unit's limits; force by the speed that it leaves against
     the one at which the motor counts as standing.
     """
-    current, supply, state = np.abs(run["current_mean"]), run["supply_voltage"], run["state"]
+    current, supply, state = run["current_mean"], run["supply_voltage"], run["state"]
     bounds = run.limits
-    for name in ("drag_extension", "drag_retraction", "overcurrent"):
-        yield "current", abs(float(current.max()) / bounds[name] - 1.0)
-    for name, value in (("undervoltage", supply.min()), ("logic_voltage", supply.min()),
-                        ("overvoltage", supply.max())):  # fmt: skip
-        yield "voltage", abs(float(value) / bounds[name] - 1.0)
+    for name, motoring in (("drag_extension", current), ("drag_retraction", -current)):
+        yield "current", abs(_level(run.time, motoring, bounds["drag_time"]) / bounds[name] - 1.0)
+    yield "current", abs(float(np.abs(current).max()) / bounds["overcurrent"] - 1.0)
+    lowest, highest = float(supply.min()), float(supply.max())
+    yield "voltage", abs(lowest / bounds["undervoltage"] - 1.0)
+    yield "voltage", abs(lowest / bounds["logic_voltage"] - 1.0)
+    if highest > 1.001 * supply[0]:  # the motor or a surge has raised it
+        yield "voltage", abs(highest / bounds["overvoltage"] - 1.0)
     yield "time", abs(_longest(run.time, np.isin(state, MOVING)) / bounds["motion_timeout"] - 1.0)
     yield "time", abs(_longest(run.time, state == FALLING) / bounds["fall_time"] - 1.0)
     driven = np.isin(state, MOVING) & (run["brake_released"] > 0.5)
@@ -195,6 +208,12 @@ def distances(run: Watched) -> Iterator[tuple[str, float]]:
 
 FALLING = 5
 """The state `released`."""
+
+
+def _level(time: Floats, values: Floats, least: float) -> float:
+    """Value that is exceeded for a time in all, in s."""
+    count = round(least / float(time[1] - time[0]))
+    return float(np.partition(values, -count)[-count]) if count < len(values) else 0.0
 
 
 def _longest(time: Floats, flags: npt.NDArray[np.bool_]) -> float:
