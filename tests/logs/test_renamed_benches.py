@@ -134,11 +134,21 @@ CONDITIONS = {
 }  # fmt: skip
 
 
+#: What is known to change a verdict, and why.
+MISSED = {
+    ("linear", "backlash@transmission=0.1mm", "0.5 s lost"): "1.1 of 6 s do not count: not seen",
+}
+CELLS = [
+    pytest.param(b, f, how, marks=[pytest.mark.xfail(reason=MISSED[b, f, how], strict=True)]
+                 if (b, f, how) in MISSED else [])
+    for b, faults in CONDITIONS.items()
+    for f in faults
+    for how in ("2 % lost", "0.5 s lost", "5 % jitter")
+]  # fmt: skip
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("how", ["2 % lost", "0.5 s lost", "5 % jitter"])
-@pytest.mark.parametrize(
-    ("bench", "fault"), [(b, f) for b, faults in CONDITIONS.items() for f in faults]
-)
+@pytest.mark.parametrize(("bench", "fault", "how"), CELLS)
 def test_rows_lost_and_stray_instants_change_no_verdict(bench, fault, how):
     """The same status, probability within 0.1, severity within the whole log's interval."""
     units, actuator = BENCHES[bench][2], Actuator.load(BENCHES[bench][0])

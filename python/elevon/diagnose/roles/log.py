@@ -26,7 +26,7 @@ _LONGEST = 60.0  # s after the onset that are read
 _LADDER = 0.1  # of the log's length: the lengths after the onset that are read differ by it
 _EXACT = 2e-4  # of the command's range: what straight lines may miss
 _LONG_GAP = 0.02  # s: over a shorter one the command is as good as known
-_SETTLES = 0.3  # s after a longer gap that do not count. ASSUMED: three lags of a slow loop
+_SETTLES = 0.6  # s after a longer gap that do not count. ASSUMED: three lags of a slow loop
 _QUIET = 1e-3  # of the command's range: below it nothing is commanded
 
 
