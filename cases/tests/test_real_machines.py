@@ -62,3 +62,9 @@ def test_what_no_fit_determined_is_no_pass():
 
 def test_a_number_below_the_authors_fails_as_one_above():
     assert not all(check.passed for check in real("hsm150", 0.7))
+
+
+def test_files_do_not_agree_where_one_determines_nothing():
+    checks = RealMachineResult([], [], {}, "", "", {}, machines()["dynamometer"]).checks
+    (apart,) = (check for check in checks if check.name.endswith("intervals apart"))
+    assert not apart.passed

@@ -200,16 +200,22 @@ class RealMachineResult(CheckedResult):
         return checks
 
     def _agreement(self) -> list[Check]:
-        """Return by how much the intervals of one quantity of fits of a group lie apart."""
+        """Return by how much the inertias of the fits of a group lie apart.
+
+        Where a fit did not determine it, that is no number, and no pass.
+        """
         checks = []
-        for group in dict.fromkeys(fit.group for fit in self.machine.fits if fit.group):
-            mine = [row for row in self.rows if self._fit(row.fit).group == group]
-            for quantity in ("inertia", "mass"):
-                rows = [row for row in mine if row.quantity == quantity]
-                if rows:
-                    apart = max(row.low for row in rows) - min(row.high for row in rows)
-                    name = f"{group}: {quantity}, intervals apart"
-                    checks.append(Check(name, apart, 0.0, rows[0].unit))
+        groups = [fit.group for fit in self.machine.fits if fit.group]
+        for group in dict.fromkeys(groups):
+            rows = [
+                row
+                for row in self.rows
+                if row.quantity == "inertia" and self._fit(row.fit).group == group
+            ]
+            apart = float("nan")
+            if len(rows) == groups.count(group):
+                apart = max(row.low for row in rows) - min(row.high for row in rows)
+            checks.append(Check(f"{group}: inertia, intervals apart", apart, 0.0, "kg m2"))
         return checks
 
     def _held_out(self) -> list[Check]:

@@ -18,6 +18,7 @@ from elevon.report.checks import Check, verdict
 from elevon.report.figures import COLOURS, new_figure
 from elevon_cases.page import BLUE, GREEN, GREY, ORANGE, table_of, with_end
 from elevon_cases.torino.backlash_estimate import backlash_from_encoder, flat_lengths, lost_motion
+from elevon_cases.torino.bench_unit import encoder_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,8 +144,7 @@ def reproduce_backlash(*, seed: int = 0, progress: Progress | None = None) -> Ba
     values = actuator.parameters
     ratio = values.value("gear.ratio")
     gain = values.value("control.position_gain") / ratio
-    edges = values.value("sensor.encoder.pulses") * values.value("sensor.encoder.edges")
-    count = 360.0 / (edges * values.value("sensor.encoder.wheel_ratio"))
+    count = encoder_count(actuator)
     rows = [
         _row(row, recording, blank, gain=gain, ratio=ratio, count=count)
         for row, recording in zip(table, recordings, strict=True)

@@ -114,3 +114,10 @@ def logs_of(
     recordings = simulate_batch(runs, fidelity=fidelity, record=record, progress=progress)
     ended = completed(recordings) if whole else recordings
     return [traced(setup, run) for setup, run in zip(ready, ended, strict=True)]
+
+
+def encoder_count(actuator: Actuator) -> float:
+    """Return one count of the encoder, at the output [deg]."""
+    value = actuator.parameters.value
+    edges = value("sensor.encoder.pulses") * value("sensor.encoder.edges")
+    return 360.0 / (edges * value("sensor.encoder.wheel_ratio"))

@@ -34,12 +34,12 @@ from elevon_cases.torino.bench_unit import (
     ACTUATOR,
     READINGS,
     bench_logs,
+    encoder_count,
     hidden_and_calibrated,
     micrometer,
     procedure_of,
     trace,
 )
-from elevon_cases.torino.validation import encoder_count
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,7 +18,7 @@ from elevon.report import Report
 from elevon.report.checks import Check, CheckedResult
 from elevon.report.figures import new_figure
 from elevon_cases.page import BLUE, GREEN, ORANGE, table_of, with_end
-from elevon_cases.torino.bench_unit import ACTUATOR
+from elevon_cases.torino.bench_unit import ACTUATOR, encoder_count
 
 if TYPE_CHECKING:
     from elevon.simulate import Run
@@ -126,9 +126,7 @@ def reproduce_gear(*, seed: int = 0, progress: Progress | None = None) -> GearRe
     lost = {name: [_between(log, ratio) for log in some[-2:]] for name, some in logs.items()}
     reference = logs[PLANETS][-1]
     rows = [_row(name, some, lost[name], reference) for name, some in logs.items()]
-    values = actuator.parameters.value
-    count = 360.0 / (values("sensor.encoder.pulses") * values("sensor.encoder.edges")
-                     * values("sensor.encoder.wheel_ratio"))  # fmt: skip
+    count = encoder_count(actuator)
     curves = {name: pair[1] for name, pair in lags.items()}
     time = reference["output_position"].time
     return GearResult(rows, mesh_rows(models[PLANETS]), count, actuator.hash,

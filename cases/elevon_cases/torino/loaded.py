@@ -25,9 +25,10 @@ from elevon_cases.torino.backlash_estimate import lost_motion
 from elevon_cases.torino.bench_unit import (
     ACTUATOR,
     bench_logs,
+    encoder_count,
     hidden_and_calibrated,
 )
-from elevon_cases.torino.validation import SHOWS, encoder_count
+from elevon_cases.torino.validation import SHOWS
 
 PERIOD = 20.0
 """Of the command [s]."""

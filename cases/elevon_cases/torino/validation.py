@@ -30,6 +30,7 @@ from elevon_cases.torino.bench_unit import (
     READINGS,
     SINE,
     bench_logs,
+    encoder_count,
     hidden_and_calibrated,
     micrometer,
     procedure_of,
@@ -194,13 +195,6 @@ def reproduce_torino_validation(
         facts.append(_facts(curve, ready))
     total = math.degrees(model.parameters.value("backlash.total"))
     return TorinoValidation(rows, facts, total, fidelity, seed, model.hash, curves, count)
-
-
-def encoder_count(actuator: Actuator) -> float:
-    """Return one count of the encoder, at the output [deg]."""
-    value = actuator.parameters.value
-    edges = value("sensor.encoder.pulses") * value("sensor.encoder.edges")
-    return 360.0 / (edges * value("sensor.encoder.wheel_ratio"))
 
 
 def backlash_at(model: Actuator, reading: float) -> float:
