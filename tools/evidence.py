@@ -8,7 +8,8 @@
 
 Each record, docs/evidence/runs/NAME.json, has the command, the day, the commit and the checks as
 the command printed them. A page shows one between `<!-- run NAME -->` (a sentence) or
-`<!-- checks NAME -->` (a table) and `<!-- end -->`; `make docs` makes a page of all of them.
+`<!-- checks NAME -->` (a table), or `<!-- determined NAME -->` (of a real machine, what was
+determined and predicted) and `<!-- end -->`; `make docs` makes a page of all of them.
 `<!-- judged NAME -->` stands for the last row of runs/judged.csv whose command has that word.
 """
 
@@ -32,7 +33,11 @@ CASES = (
     "pisa-functional", "pisa-friction", "pisa-hydraulic", "nasa-faults", "nasa-flight",
     "pisa-validation", "pisa-commutation",
 )  # fmt: skip
-BLOCK = re.compile(r"^<!-- (run|checks|judged) (\S+) -->\n.*?^<!-- end -->$", re.M | re.S)
+#: What is kept of a real machine beside its checks.
+REAL = ("rows", "predictions", "source", "licence", "sha256")
+BLOCK = re.compile(
+    r"^<!-- (run|checks|determined|judged) (\S+) -->\n.*?^<!-- end -->$", re.M | re.S
+)
 
 
 def main(arguments: list[str]) -> int:
@@ -47,8 +52,10 @@ def main(arguments: list[str]) -> int:
             wrong += not same
         else:
             printed = options.printed.read_text("utf-8") if options.printed else _printed(command)
-            checks = list(json.loads(printed)["checks"])
-            text = json.dumps(record(command, checks), indent=1)
+            found = json.loads(printed)
+            checks = list(found["checks"])
+            more = {key: found[key] for key in REAL if "predictions" in found}
+            text = json.dumps(record(command, checks) | more, indent=1)
             (RUNS / f"{name}.json").write_text(text + "\n", "utf-8")
             print(f"{name}: {len(checks)} checks", flush=True)
     if not options.check:
@@ -102,6 +109,8 @@ def _block(form: str, name: str) -> str:
     if form == "judged":
         return _judged(name)
     run = kept(name)
+    if form == "determined":
+        return _determined(run)
     checks = [dict(check) for check in run["checks"]]  # type: ignore[attr-defined]
     missed = [check for check in checks if not check["passed"]]
     text = f"`{run['command']}`, {run['date']}, commit `{run['commit']}`: "
@@ -113,6 +122,30 @@ def _block(form: str, name: str) -> str:
         return "\n".join([text, *head, *rows, ""])
     lines = [f"* not met: {c['name']}: {_value(c)} ({_limit(c)})" for c in missed]
     return "\n".join([text, *lines, ""]) if lines else text
+
+
+def _determined(run: dict[str, object]) -> str:
+    """Return the tables of a real machine: its numbers beside the authors', errors held out."""
+    rows: list[dict[str, object]] = run["rows"]  # type: ignore[assignment]
+    lines = ["| fit | quantity | value | 90 % interval | authors | off |", "|" + "---|" * 6]
+    for row in rows:
+        theirs = "" if row["printed"] is None else f"{row['printed']:.6g}"
+        off = "" if row["off_percent"] is None else f"{row['off_percent']:+.2f} %"
+        interval = f"{row['low']:.4g} to {row['high']:.4g}"
+        number = f"{row['value']:.5g} {row['unit']}"
+        quantity = str(row["quantity"]).replace("_", " ")
+        lines.append(f"| {row['fit']} | {quantity} | {number} | {interval} | {theirs} | {off} |")
+    lines += ["", "| fit | held-out log | signal | RMS error | % of range |", "|" + "---|" * 5]
+    errors: list[dict[str, object]] = run["predictions"]  # type: ignore[assignment]
+    for row in errors:
+        if row["held_out"]:
+            size, share = f"{row['rms']:.3g} {row['unit']}", f"{row['percent_of_range']:.2g}"
+            signal = str(row["signal"]).replace("_", " ")
+            lines.append(f"| {row['fit']} | {row['log']} | {signal} | {size} | {share} |")
+    digits: dict[str, str] = run["sha256"]  # type: ignore[assignment]
+    lines += ["", f"Data: {run['source']}. Licence: {run['licence']}. SHA-256:", ""]
+    lines += [f"* `{name}` `{value}`" for name, value in digits.items()]
+    return "\n".join([*lines, ""])
 
 
 def _judged(name: str) -> str:
@@ -136,6 +169,8 @@ def _counts(checks: list[dict[str, object]]) -> str:
 
 
 def _value(check: dict[str, object]) -> str:
+    if check["value"] is None:
+        return "no number"
     unit = f" {check['unit']}" if check.get("unit") else ""
     return f"{check['value']:.4g}{unit}"
 

@@ -89,5 +89,6 @@ def cells(check: dict[str, object]) -> list[str]:
     passed = "yes" if check["passed"] else "no"
     name = plain(check["name"])
     kind = str(check.get("kind", "")).replace("_", " ")
-    value, limit = f"{check['value']:.5g}{unit}", f"{way} {check['limit']:.5g}"
+    value = "no number" if check["value"] is None else f"{check['value']:.5g}{unit}"
+    limit = f"{way} {check['limit']:.5g}"
     return [name, kind, value, limit, printed, passed]
