@@ -338,7 +338,7 @@ def machine_page(result: RealMachineResult, date: str | None = None) -> Report:
     report = Report(
         machine.title,
         f"Data: {machine.source}; licence: {machine.licence}. Nothing of them is part of Elevon. "
-        "Held-out files were fixed before the first fit.",
+        "Held-out files were fixed before they were run.",
         date=date,
     )
     determined = (
