@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 
 from elevon.cli.help import PlainCommand
-from elevon.cli.options import SHARED, annotated
+from elevon.cli.options import SHARED, annotated, own_parameters
 from elevon.cli.output import answer, print_json, print_table, progress_bar, say
 from elevon.option import Option
 from elevon_cases.catalogue import Published, published
@@ -40,8 +40,9 @@ class PublishedCase:
     ----------
     name, text, title : str
         The command; what it does, in one sentence; command_class while it works.
-    work : str
-        To a result, which has ``to_dict()`` with status, checks and rows.
+    work : str or callable
+        To a result, which has ``to_dict()`` with status, checks and rows. Of a function its
+        signature and docstring state the options.
     columns : tuple of str
         Of the rows' table; empty: none.
     table : str or None
@@ -58,13 +59,14 @@ class PublishedCase:
     seeded : bool
         Whether it draws random numbers.
     prepare, show, finish : callable or None
-        Before the work (refuse what cannot be written), after the table, and after the report.
+        Before the work (refuse what cannot be written), after the table, and after the report;
+        what `finish` takes beyond the result is an option, too.
     """
 
     name: str
     text: str
     title: str
-    work: str
+    work: str | Callable[..., Any]
     columns: tuple[str, ...] = ()
     table: str | None = None
     page: str = ""
@@ -74,7 +76,7 @@ class PublishedCase:
     seeded: bool = True
     prepare: Callable[[Options], None] | None = None
     show: Callable[[Values, Any], None] | None = None
-    finish: Callable[[Any, Options], None] | None = None
+    finish: Callable[..., None] | None = None
 
     def signature(self) -> dict[str, tuple[object, object]]:
         """Return its options: name to annotation and default."""
@@ -92,7 +94,14 @@ class PublishedCase:
             name: (annotated(name, kind, texts[name]), default)
             for name, (kind, default) in common.items()
         }
-        return shared | {name: _own_option(name, entry) for name, entry in self.options.items()}
+        stated = {name: _own_option(name, entry) for name, entry in self.options.items()}
+        known = {"result", "progress", "seed", "out", "force", "date", *stated}
+        for function in (self.work, self.finish):
+            if callable(function):
+                for item in own_parameters(function, without=[*known]):
+                    stated[item.name] = (item.annotation, item.default)
+                    known.add(item.name)
+        return shared | stated
 
     @property
     def published(self) -> Published | None:
@@ -107,10 +116,13 @@ class PublishedCase:
         """Return the page of a result."""
         return cast("Report", self.call(self.page, result, **options))
 
-    def call(self, function: str, *arguments: Any, **options: Any) -> Any:
-        """Call a function by its name, with the options that it has arguments for."""
-        module, _, name = function.partition(":")
-        called = getattr(import_module(module), name)
+    def call(self, function: str | Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+        """Call a function, or one by its name, with the options that it has arguments for."""
+        called = function
+        if isinstance(function, str):
+            module, _, name = function.partition(":")
+            called = getattr(import_module(module), name)
+        assert callable(called)
         known = options | {to: options[name] for to, name in self.names.items() if name in options}
         accepted = inspect.signature(called).parameters
         given = {k: v for k, v in known.items() if k in accepted and v is not None}
@@ -173,7 +185,7 @@ def _run(case: PublishedCase, options: Options) -> int:
     with progress_bar(case.title) as advance:
         result, values = compute(case, options, advance)
     if case.finish is not None:
-        case.finish(result, options)
+        case.call(case.finish, result, **options)
     if options["as_json"]:
         print_json(values)
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from elevon.cli.output import answer, print_table, say
@@ -22,13 +23,20 @@ def _check_picture(options: Options) -> None:
     check_file(options["picture"], options)
 
 
-def _save_picture(result: Any, options: Options) -> None:
-    if options["picture"] is not None:
+def _save_picture(result: Any, *, force: bool, picture: Path | None = None) -> None:
+    """Draw the summary on its own.
+
+    Parameters
+    ----------
+    picture : path
+        File for the summary plot: .svg, .png, .pdf.
+    """
+    if picture is not None:
         from elevon.report.figures import save_figure
         from elevon_cases.torino.backlash import summary_figure
 
         figure = summary_figure(result.rows)
-        say(f"picture: {save_figure(figure, options['picture'], force=options['force'])}")
+        say(f"picture: {save_figure(figure, picture, force=force)}")
 
 
 def _show_backlash(values: Values, _result: Any) -> None:
