@@ -1,6 +1,7 @@
 """The public names of the package, each with its module: for type checkers, and for the package."""
 
 from elevon.actuator import Actuator as Actuator
+from elevon.actuator import actuators as actuators
 from elevon.actuator import list_actuators as list_actuators
 from elevon.calibrate.door import calibrate as calibrate
 from elevon.calibrate.door import validate as validate

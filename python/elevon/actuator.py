@@ -8,7 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from elevon.documents import read_toml
 from elevon.parameters import Parameter, ParameterSet, load_set, set_names
+from elevon.parameters.load import set_paths
 from elevon.plain import Plain
 from elevon.seam import ValueFinding
 
@@ -137,6 +139,18 @@ class Actuator(Plain):
         from elevon import _core
 
         return _core.check(self.wiring, fidelity, self.parameters.vector())
+
+
+def actuators() -> dict[str, str]:
+    """Return the actuators that `Actuator.load` knows: name to title, by name.
+
+    >>> "torino-rotary" in actuators()
+    True
+    """
+    return {
+        name: str(read_toml(path).data.get("title", ""))
+        for name, path in sorted(set_paths().items())
+    }
 
 
 def list_actuators() -> list[str]:

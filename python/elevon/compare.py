@@ -15,6 +15,7 @@ from elevon.errors import InputError, RangeError, SimulationError
 from elevon.plain import STORED, in_unit, key
 from elevon.progress import Progress, part
 from elevon.recording import Recording
+from elevon.report import ReportTable
 from elevon.results import Result
 from elevon.scenario import Scenario
 
@@ -156,6 +157,29 @@ class Comparison(Result):
             f"{self.actuator}: the reduced-order model is {100 * self.position_nrmse:.3g} % of the "
             f"amplitude from the switching one, {self.speed_up:.0f} times as fast."
         )
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the differences and the speeds, of each load where there are several."""
+        values = self.to_dict(stored=False)
+        runs = values["loads"] or {"": values}
+        lines = (
+            ("output position", "position_nrmse", ".3%", "of the amplitude"),
+            ("motor speed", "speed_nrmse", ".3%", "of its RMS"),
+            ("torque current", "q_current_nrmse", ".3%", "of its RMS"),
+            ("reduced-order model", "low_realtime_factor", ".0f", "times real time"),
+            ("speed-up", "speed_up", ".0f", "times the switching model"),
+        )
+        rows = [
+            [name, *(f"{run[key]:{form}} {what}".replace("%", " %") for run in runs.values())]
+            for name, key, form, what in lines
+        ]
+        return [ReportTable(["RMS of low less high", *runs], rows)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What of the runs was compared."""
+        values = self.to_dict(stored=False)
+        return [f"after {values['start_s']:g} s; {values['filter']}"]
 
 
 def default_scenario(actuator: Actuator) -> Scenario:

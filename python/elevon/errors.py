@@ -110,7 +110,10 @@ class OutputError(InputError, OSError):
 
 
 class OutputExistsError(OutputError):
-    """An output that exists already and may not be replaced."""
+    """An output that exists already and may not be replaced; the message says how it can be."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(f"{text}; use force (--force) to replace it")
 
 
 class BusyError(InputError):

@@ -194,7 +194,7 @@ def check_output(path: str | os.PathLike[str], *, force: bool = False) -> Path:
     if target.is_dir():
         raise OutputError(f"{target}: is a folder, not a file")
     if os.path.lexists(target) and not force:
-        raise OutputExistsError(f"{target}: exists already; use force (--force) to replace it")
+        raise OutputExistsError(f"{target}: exists already")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from elevon.report import Report
+    from elevon.report import Report, ReportTable
 
 SCHEMA = "elevon/{}/{}"
 _MOST_BYTES = 2**28  # of a result's file
@@ -68,6 +68,15 @@ class Result(Plain):
     def headline(self) -> str:
         """The answer in one sentence."""
         return f"{type(self).__name__}: {getattr(self, 'status', 'ok')}"
+
+    def text_tables(self) -> Sequence[ReportTable]:
+        """Return the tables of the answer as people read them; of texts."""
+        return ()
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What else to know of the answer, the most important first."""
+        return ()
 
     def to_dict(self, *, stored: bool = True) -> dict[str, Any]:
         """Return the JSON form, beside it its schema and the units of its keys."""

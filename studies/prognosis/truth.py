@@ -43,6 +43,8 @@ _UNITS: Mapping[str, tuple[float, float]] = {
     "motor.emf_constant": (0.02, 0.005),
     "motor.inertia": (0.05, 0.02),
 }
+_OWN_HEAT = (0.1, 0.3)  # median and deviation of the logarithm of windings' over the law's
+_GRAIN = 1.5  # of the windings' scatter over the law's
 _FACTOR = (0.2, 0.5)  # median and deviation of the logarithm of a unit's growth over the law's
 INSPECTION_DAYS = 3
 """Days on which an inspection's logs are taken, one a standard test."""
@@ -189,6 +191,14 @@ class UnitTruth:
     response: ResponseTables | None = None
 
 
+def _true_law(law: Law, rng: np.random.Generator) -> Law:
+    """Return the law as it truly is in one unit: windings heat themselves at another rate."""
+    if law.name != "insulation":
+        return other_law(law, rng)
+    heat = law.coefficients["own_heat"].value * float(np.exp(rng.normal(*_OWN_HEAT)))
+    return replace(law.with_values({"own_heat": heat}), grain=_GRAIN * law.grain)
+
+
 def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int) -> UnitTruth:
     """Let one unit live on the switching model until it fails.
 
@@ -205,7 +215,7 @@ def true_unit(base: Actuator, mission: Mission, law: str, number: int, seed: int
         ratio = values["friction.dynamic"] / base.parameters.value("friction.dynamic")
         values["friction.static"] = ratio * base.parameters.value("friction.static")
     believed = {item.name: item for item in mission.laws()}[law]
-    true = other_law(believed, rng)
+    true = _true_law(believed, rng)
     key = {"severity"}
     reduced = mission.model_copy(
         update={

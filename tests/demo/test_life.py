@@ -1,5 +1,6 @@
 """The demonstration of a life: its unit, its pictures, and the whole of it."""
 
+import base64
 import json
 import re
 from types import SimpleNamespace
@@ -9,9 +10,10 @@ import pytest
 
 from elevon import Actuator
 from elevon.cli import main
-from elevon.demo.mechanism import Motion, mechanism, motion
+from elevon.demo.page import sweep
 from elevon.demo.unit import demo_mission, faults_at, hidden_unit, of_day
 from elevon.prognose.future import Life
+from elevon.report.mechanism import mechanism, moving_svg, trace
 
 
 @pytest.fixture(scope="module")
@@ -44,27 +46,25 @@ def test_faults_follow_the_life():
 
 def test_the_picture_moves_with_the_simulated_motion(base):
     demo = SimpleNamespace(hidden=hidden_unit(base, 0), life=life())
-    new, worn = motion(demo, 0.0), motion(demo, 3000.0)
-    assert np.ptp(new.output) == pytest.approx(14.0, rel=0.1)
-    gaps = [float(np.ptp(m.driver - m.output)) for m in (new, worn)]
-    assert gaps == pytest.approx([new.backlash, worn.backlash], rel=0.1)
-    assert worn.backlash - new.backlash == pytest.approx(np.degrees(0.015))
-    markup = str(mechanism([("new", new), ("<worn>", worn)]))
-    assert markup.count("<animateTransform") == 6
-    assert "&lt;worn&gt;" in markup
-    assert "http" not in markup.replace('xmlns="http://www.w3.org/2000/svg"', "")
+    new, worn = ("".join(sweep(demo, usage)) for usage in (0.0, 3000.0))
+    assert new.count("<animateTransform") == worn.count("<animateTransform") == 7
+    total = np.degrees(demo.hidden.parameters.value("backlash.total"))
+    printed = [float(re.search(r"([\d.]+)° in all", text)[1]) for text in (new, worn)]
+    assert printed == pytest.approx([total, total + np.degrees(0.015)], rel=0.1)
 
 
-def test_the_pin_stays_within_its_fork():
-    swing = 7.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 101))
-    gap = 0.5 * np.sign(np.cos(np.linspace(0.0, 2.0 * np.pi, 101)))
-    markup = str(mechanism([("x", Motion(swing, swing + gap, swing, swing, 1.0, 0.0))]))
-    angles = [
-        np.array([float(v.split()[0]) for v in text.split(";")])
-        for text in re.findall(r'rotate"[^>]*values="([^"]*)"', markup)
-    ]
-    _, fork, pin = angles
-    assert np.abs(pin - fork).max() == pytest.approx(0.5 * 26.0, abs=0.05)
+def test_the_drawing_follows_the_signals():
+    turn = np.linspace(0.0, 2.0 * np.pi, 101)
+    gap = 0.01 * np.sign(np.cos(turn))
+    drawn = {"motor_position": 10.0 * turn, "output_position": 0.1 * np.sin(turn),
+             "command": 0.1 * np.sin(turn)}  # fmt: skip
+    picture = moving_svg([mechanism(drawn, gap, 10.0, 5.0), trace(np.degrees(gap), 5.0)], "x",
+                         height=280)  # fmt: skip
+    assert "http" not in picture.replace('xmlns="http://www.w3.org/2000/svg"', "")
+    moved = re.search(r'type="translate" values="([^"]*)" dur="5.00s"', picture)[1]
+    places = np.array([float(text.split()[0]) for text in moved.split(";")])
+    assert np.ptp(places) == pytest.approx(0.02 / 0.03 * 60.0, abs=0.1)
+    assert "1.15° in all" in picture
 
 
 @pytest.mark.parametrize("option", ["--part", "--which"])
@@ -93,7 +93,8 @@ def test_the_whole_story(tmp_path, capsys):
     assert [check["name"] for check in result["checks"] if not check["passed"]] == []
     assert code == 0
     page = (out / "report.html").read_text("utf-8")
-    assert "<animateTransform" in page
+    picture = re.search(r'src="data:image/svg\+xml;base64,([^"]+)"', page)[1]
+    assert b"<animateTransform" in base64.b64decode(picture)
     for outside in ("<script src", "<link", '<img src="http', "url(http"):
         assert outside not in page
     options = ["--actuator", str(out / "calibrated.toml"), "--mission", str(out / "mission.toml")]

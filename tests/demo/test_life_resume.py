@@ -2,7 +2,6 @@
 
 import json
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ from elevon import Actuator
 from elevon.calibrate.outcome import Calibration
 from elevon.cli import main
 from elevon.demo import run as life_run
-from elevon.demo.run import Statement
 from elevon.demo.unit import demo_mission
+from elevon.diagnose.engine.answer import Cause, Diagnosis
 from elevon.plain import plain, read_plain
 from elevon.prognose import ResponseTables
 from elevon.prognose.future import Life
@@ -37,26 +36,15 @@ def tables():
     )
 
 
-class Answer(SimpleNamespace):
-    """A diagnosis of a backlash."""
-
-    def __init__(self, severity):
-        super().__init__(
-            status="healthy",
-            chance=0.5,
-            false_alarm=0.01,
-            p_fault=0.1,
-            findings=(),
-            would_be_seen={},
-            severity_units={},
-            severity=severity,
-        )
-
-    def to_dict(self):
-        cause = {"kind": "backlash", "place": "transmission", "unit": "rad", "probability": 0.9,
-                 "severity": self.severity, "interval": [0.9 * self.severity, 1.1 * self.severity],
-                 "ambiguous_with": []}  # fmt: skip
-        return {"status": "faulty", "faults": [cause], "best": {"faults": [KEY]}, "detectable": {}}
+def answer(severity):
+    """Return a diagnosis of a backlash."""
+    spread = (0.9 * severity, 1.1 * severity)
+    cause = Cause("backlash", "transmission", "rad", 0.9, severity, spread)
+    return Diagnosis(
+        logs=("log",), status="faulty", p_fault=0.9, false_alarm=0.05, chance=0.01,
+        faults=(cause,), best=(KEY,), p_best=0.9, unobservable=(), detectable={}, features=(),
+        findings=(), seconds=0.1,
+    )  # fmt: skip
 
 
 class Story:
@@ -69,13 +57,12 @@ class Story:
         replaced = {
             "elevon.demo.run.live": self.step("life", Life(usage, severity, 1500.0, 0)),
             "elevon.demo.run._log": self.log,
-            "elevon.bench.run.run_procedure": self.bench,
-            "elevon.logs.read.read_drive_logs": lambda paths, **_options: paths,
-            "elevon.calibrate.calibrate": self.calibrate,
-            "elevon.calibrate.write.write_calibration": self.write,
+            "elevon.bench": self.bench,
+            "elevon.calibrate": self.calibrate,
             "elevon.demo.run.respond": self.step("tables", tables()),
-            "elevon.diagnose.by_model.diagnose": self.diagnose,
+            "elevon.diagnose": self.diagnose,
             "elevon.demo.page.life_report": self.step("report", Report("life")),
+            "elevon.demo.page.prognosis_page": lambda *_args, **_options: Report("prognosis"),
             "elevon.demo.page.moving_picture": lambda _demo: "<svg/>",
             "elevon.demo.page.cone_figure": lambda _demo: None,
             "elevon.report.figures.save_figure": lambda *_args, **_options: None,
@@ -93,10 +80,10 @@ class Story:
 
         return work
 
-    def bench(self, procedure, _actuator, out, **_options):
+    def bench(self, _procedure, _actuator, out, **_options):
         out.mkdir(parents=True, exist_ok=True)
-        for trace in procedure.traces:
-            (out / f"{trace.name}.csv").write_text(trace.name)
+        for name in ("sine", "chirp", "loaded"):
+            (out / f"{name}.csv").write_text(name)
 
     def log(self, demo, name, usage, _number):
         path = demo.folder / "logs" / name / "log.csv"
@@ -109,17 +96,13 @@ class Story:
         fitted = base.with_values({"backlash.total": 0.001}, source="calibration")
         return Calibration(actuator=fitted, before=base, logs=(), parameters={})
 
-    def write(self, path, _result, *, force):
-        assert force
-        path.write_text("set")
-
-    def diagnose(self, logs, _actuator, *, baselines):
+    def diagnose(self, log, _actuator, *, baselines):
         assert len(baselines) == 2
-        usage = float(logs[0].read_text())
+        usage = float(log.read_text())
         number = 1 + sum(call.startswith("diagnosis") for call in self.all)
         self.step(f"diagnosis {number}")()
         self.all.append(f"diagnosis {number}")
-        return Answer(1e-5 * usage)
+        return answer(1e-5 * usage)
 
     def run(self, out, *options, stop=None, fresh=False):
         if fresh:
@@ -139,8 +122,16 @@ def test_every_interruption_keeps_what_is_finished(story, tmp_path, capsys):
     done = [
         ("life", ["life"], "no step is finished"),
         ("calibration", ["life", "calibration"], "the unit's life"),
-        ("diagnosis 3", ["calibration", "tables", *tail[:3]], "the unit's life, 2 diagnoses"),
-        ("report", ["tables", *tail[2:], "report"], "the unit's life, 4 diagnoses"),
+        (
+            "diagnosis 3",
+            ["calibration", "tables", *tail[:3]],
+            "the unit's life, the calibration, 2 diagnoses",
+        ),
+        (
+            "report",
+            ["tables", *tail[2:], "report"],
+            "the unit's life, the calibration, 4 diagnoses",
+        ),
     ]
     for k, (place, calls, text) in enumerate(done):
         assert story.run(out, stop=place, fresh=k == 0) == (130, calls)
@@ -177,10 +168,10 @@ def test_an_edited_log_is_diagnosed_anew(story, tmp_path, monkeypatch):
 
 
 def test_what_a_diagnosis_says_comes_back_from_json():
-    statement = Statement.of(Answer(0.01))
-    again = read_plain(Statement, json.loads(json.dumps(plain(statement))), "statement")
+    statement = answer(0.01)
+    again = read_plain(Diagnosis, json.loads(json.dumps(plain(statement))), "diagnosis")
     assert again == statement
-    assert (again.status, again.best) == ("faulty", [KEY])
+    assert (again.status, again.best, again.headline) == ("faulty", (KEY,), statement.headline)
 
 
 def test_other_work_is_refused(story, tmp_path, capsys):

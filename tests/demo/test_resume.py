@@ -16,11 +16,10 @@ import pytest
 
 import elevon
 from elevon import Actuator
-from elevon.bench.hidden import RECOVERED, hidden_actuator
+from elevon.bench.hidden import RECOVERED
 from elevon.calibrate.outcome import Calibration, by_path
 from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
-from elevon.demo.story import FinishedSteps, Step, work_key
-from elevon.errors import OutputExistsError
+from elevon.demo.story import Story
 from elevon.estimate import Estimate
 from elevon.plain import Plain
 
@@ -91,20 +90,6 @@ def test_values_that_are_damaged_are_not_taken(base):
         Calibration.from_dict(data)
 
 
-def test_the_work_is_known_by_version_seed_and_actuator_files(base, monkeypatch):
-    hidden = hidden_actuator(base, 0)
-    keys = {
-        work_key(0, base, hidden),
-        work_key(1, base, hidden),
-        work_key(0, base, hidden_actuator(base, 1)),
-        work_key(0, base.with_values({"gear.ratio": 125.0}), hidden),
-    }
-    assert work_key(0, base, hidden) in keys
-    monkeypatch.setattr(elevon, "__version__", "0.0.1", raising=False)
-    keys.add(work_key(0, base, hidden))
-    assert len(keys) == 5
-
-
 @dataclass(frozen=True)
 class Kept(Plain):
     """A step's result."""
@@ -112,29 +97,39 @@ class Kept(Plain):
     x: float
 
 
+@dataclass(frozen=True)
+class Other(Plain):
+    """A result of another form."""
+
+    y: str
+
+
+def made(story, page, x, kind=Kept, piece="life"):
+    """Do the step, or take it; return its result and whether it was taken."""
+    result = story.kept("step", piece, kind, lambda: Kept(x), [page])
+    return result.x, story.steps[-1].resumed
+
+
 def test_a_step_counts_only_as_it_was_kept(tmp_path):
     page = tmp_path / "page.html"
     page.write_text("page")
-    kept = FinishedSteps(tmp_path, "a" * 32)
-    assert not kept.begun(force=False)
-    kept.begin()
-    kept.save("life", "in", {"x": 1.5}, 2.5, [page])
-    assert kept.begun(force=False)
-    assert kept.load("life", "in", Kept) == (Kept(1.5), 2.5)
-    assert kept.load("life", "other", Kept) is None
-    assert kept.load("calibration", "in", Kept) is None
-    assert kept.load("life", "in", Step) is None
-    assert FinishedSteps(tmp_path, "b" * 32).load("life", "in", Kept) is None
-    with pytest.raises(OutputExistsError, match="other work"):
-        FinishedSteps(tmp_path, "b" * 32).begun(force=False)
-    assert not FinishedSteps(tmp_path, "b" * 32).begun(force=True)
+    story = Story(tmp_path, "a")
+    assert not story.resumes
+    story.begin()
+    assert made(story, page, 1.5) == (1.5, False)
+    again = Story(tmp_path, "a")
+    assert again.resumes
+    assert made(again, page, 2.5) == (1.5, True)
+    assert made(Story(tmp_path, "a"), page, 2.5, piece="calibration") == (2.5, False)
+    assert made(Story(tmp_path, "a"), page, 2.5, Other) == (2.5, False)
+    assert made(Story(tmp_path, "a"), page, 3.5) == (2.5, True)
+    assert not Story(tmp_path, "b").resumes
     page.write_text("edited")
-    assert kept.load("life", "in", Kept) is None
-    page.write_text("page")
+    assert made(Story(tmp_path, "a"), page, 4.5) == (4.5, False)
     file = tmp_path / "unfinished.log"
     file.write_text(file.read_text()[:-20])
-    assert FinishedSteps(tmp_path, "a" * 32).load("life", "in", Kept) is None
-    kept.clear()
+    assert made(Story(tmp_path, "a"), page, 5.5) == (5.5, False)
+    Story(tmp_path, "a").clear()
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
 
 

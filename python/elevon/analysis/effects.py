@@ -221,9 +221,37 @@ class Effects(Result):
         what = f"{', '.join(moved)} move it" if moved else "no factor is seen to move it"
         return f"{self.response} [{self.unit}] in {self.runs} runs: {what}."
 
+    def text_tables(self) -> list[ReportTable]:
+        """Return the effects with their intervals, the largest first."""
+        rows = [
+            [t.term, t.name, f"{t.effect:.4g}", _interval_text(t), ", ".join(t.aliases)]
+            for t in self.terms
+        ]
+        columns = ("term", "factors", "effect", "interval", "aliased with")
+        return [ReportTable(columns, rows, f"by {self.method}")]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What the design could not tell apart."""
+        texts = [
+            f"{text}: {', '.join(names)}"
+            for text, names in (
+                ("confounded with the blocks", self.blocked),
+                ("left out, partly aliased", self.partial),
+            )
+            if names
+        ]
+        return [*texts, EQUAL_REPEATS] if self.equal_repeats else texts
+
     def report(self, *, date: str | None = None) -> Report:
         """Return its page."""
         return effects_report(self, self.folder, date=date)
+
+
+def _interval_text(term: EffectEstimate) -> str:
+    if term.low is None:
+        return "not known"
+    return f"{term.low:.4g} to {term.high:.4g}{' *' if term.significant else ''}"
 
 
 def effects_of(response: CampaignResponse, *, level: float = 0.95) -> Effects:

@@ -51,13 +51,11 @@ def claim_logs(path: Path, key: str, names: Iterable[str], *, force: bool) -> tu
     try:
         old = WorkLog.read(path)
     except FormatError as error:
-        raise OutputExistsError(f"{path}: cannot be read ({error}); use force (--force)") from error
+        raise OutputExistsError(f"{path}: cannot be read ({error})") from error
     if old is not None and old.key == key:
         return old, True
     if old is not None:
-        raise OutputExistsError(
-            f"{path}: belongs to other work; use force (--force) to replace them"
-        )
+        raise OutputExistsError(f"{path}: belongs to other work")
     for name in names:
         traces = trace_files(folder, name, cell=True)
         for file in (*traces, description_path(traces[-1])):

@@ -15,6 +15,7 @@ from elevon.estimate import Estimate
 from elevon.logs.log import Log
 from elevon.number_text import estimate_row
 from elevon.plain import REMAINDER, STORED, Plain, in_unit, key, plain
+from elevon.report import ReportTable
 from elevon.report.cards import Html, badge, card, table
 from elevon.results import Result
 
@@ -102,6 +103,12 @@ class Calibration(Result):
         known = [item.path for item in self.estimates if item.in_set]
         missing = f"; not {_listed(list(self.undetermined))}" if self.undetermined else ""
         return f"{self.name}: determined {_listed(known)}{missing}."
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return what was estimated."""
+        rows = [estimate_row(item, self.before, item.register) for item in self.estimates]
+        columns = ("parameter", "before", "after", "low", "high", "unit", "register", "holds for")
+        return [ReportTable(columns, rows, optional=("register",))]
 
     @property
     def remarks(self) -> list[str]:

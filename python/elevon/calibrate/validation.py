@@ -24,10 +24,11 @@ from elevon.logs.command.note import align_noted
 from elevon.logs.command.reconstruct import reconstruct
 from elevon.logs.drive import drive_log
 from elevon.logs.log import Log, on_clock
+from elevon.number_text import quantity_text
 from elevon.plain import STORED, Plain, in_unit, key
 from elevon.progress import Progress, part
 from elevon.recording import Recording
-from elevon.report import Report
+from elevon.report import Report, ReportTable
 from elevon.results import Result
 
 #: Signals compared: name, unit.
@@ -207,6 +208,16 @@ def about_breaks(curve: CommandCurve | None, log: Log) -> Bools | None:
     return curve.about_breaks(log.time) if curve is not None and curve.breaks else None
 
 
+def sensor_text(name: str, value: float) -> str:
+    """Return in words what a log's sensor adds: an offset, a delay or a filter."""
+    channel, _, kind = name.rpartition("_")
+    if kind == "delay" and channel:
+        return f"{channel}: the log shows it {1e3 * value:.3g} ms late"
+    if kind == "lag" and channel:
+        return f"{channel}: the log shows it behind a filter of {1e3 * value:.3g} ms"
+    return f"{name}: the sensor's offset of {value:.4g} is taken off the logs"
+
+
 @dataclass(frozen=True)
 class Validation(Result):
     """Errors of all logs.
@@ -260,6 +271,33 @@ class Validation(Result):
         if over:
             return f"{self.actuator}: not passed; over its threshold: {', '.join(over)}."
         return f"{self.actuator}: passed; {len(judged)} signals within their thresholds."
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the errors, signal by signal."""
+        rows = [
+            (e.log, e.signal, quantity_text(e.rms, e.unit, 4)[0],
+             *quantity_text(e.largest, e.unit, 4), f"{e.of_rms:.3g}", f"{e.of_range:.3g}",
+             "" if e.of_rms_away is None else f"{e.of_rms_away:.3g}",
+             "" if e.limit is None else f"{e.limit:.3g}",
+             "" if e.passed is None else "pass" if e.passed else "FAIL")
+            for e in self.errors
+        ]  # fmt: skip
+        away = "% away"
+        columns = (
+            "log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", away, "limit %", "",
+        )  # fmt: skip
+        caption = (
+            "% of RMS: RMS error over the logged signal's RMS about its mean; "
+            f"% of range: over its range; {away}: % of RMS without the 20 ms about corners "
+            f"and steps of the command; after {self.transient:g} s"
+        )
+        return [ReportTable(columns, rows, caption, optional=(away,))]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is taken off the logs, and what was seen in them."""
+        offsets = [sensor_text(name, offset) for name, offset in self.offsets.items()]
+        return [*offsets, *(f"{name}: {text}" for name, text in self.notes.items())]
 
     def report(self, *, date: str | None = None) -> Report:
         """Return its page."""

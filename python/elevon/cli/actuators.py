@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
@@ -62,12 +63,12 @@ def _chosen(record: Acting, fidelity: str | None, not_modelled: bool) -> bool:
 @command(listing)
 def actuators() -> Answer:
     """List the actuators that can be named: the shipped ones and those in ELEVON_ACTUATORS."""
-    from elevon.documents import read_toml
+    from elevon.actuator import actuators as known
     from elevon.parameters.load import set_paths
 
+    files = set_paths()
     rows = [
-        {"name": name, "title": read_toml(path).data.get("title", ""), "file": str(path)}
-        for name, path in sorted(set_paths().items())
+        {"name": name, "title": title, "file": str(files[name])} for name, title in known().items()
     ]
     return _rows("actuators", rows, ("name", "title"))
 
@@ -161,7 +162,7 @@ def faults(
     columns = ("kind", "places", "unit", "range", where, "effect", "source", "rate", "rate_source",
                "not_modelled")  # fmt: skip
     spare = ("rate_source", "source", "rate", *(() if not_modelled else ("not_modelled", where)))
-    return _rows("faults", rows, (*first, *columns), spare)
+    return _rows("faults", rows, (*first, *columns), spare, fitted=True)
 
 
 def _faults(reference: str | None, fidelity: str | None) -> list[tuple[str, FaultRecord, Row]]:
@@ -259,10 +260,16 @@ def _own_features(reference: str, fidelity: str) -> list[Row]:
 
 
 def _rows(
-    what: str, rows: list[Row], columns: Sequence[str], optional: Sequence[str] = ("acts",)
+    what: str,
+    rows: list[Row],
+    columns: Sequence[str],
+    optional: Sequence[str] = ("acts",),
+    *,
+    fitted: bool = False,
 ) -> Answer:
     cells = [[_cell(row[column]) for column in columns] for row in rows]
-    return Answer({what: rows}, lambda: print_table(columns, cells, optional=optional))
+    show = partial(print_table, columns, cells, optional=optional, fitted=fitted)
+    return Answer({what: rows}, show)
 
 
 def _cell(value: object) -> str:

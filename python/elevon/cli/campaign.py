@@ -277,32 +277,7 @@ def _range(column: Any) -> str:
 def effects(door: DoorCall) -> Answer:
     """Say which factors move a response, and by how much: main effects and interactions."""
     result: Effects = door()
-    return Answer(result, lambda: _print_effects(result), page=result.report)
-
-
-def _print_effects(effects: Effects) -> None:
-    from elevon.analysis.effects import EQUAL_REPEATS
-
-    rows = [
-        [t.term, t.name, f"{t.effect:.4g}", _interval(t), ", ".join(t.aliases)]
-        for t in effects.terms
-    ]
-    answer(effects.headline, f"by {effects.method}")
-    print_table(("term", "factors", "effect", "interval", "aliased with"), rows)
-    for text, names in (
-        ("confounded with the blocks", effects.blocked),
-        ("left out, partly aliased", effects.partial),
-    ):
-        if names:
-            typer.echo(f"{text}: {', '.join(names)}")
-    if effects.equal_repeats:
-        typer.echo(EQUAL_REPEATS)
-
-
-def _interval(term: Any) -> str:
-    if term.low is None:
-        return "not known"
-    return f"{term.low:.4g} to {term.high:.4g}{' *' if term.significant else ''}"
+    return Answer(result, page=result.report)
 
 
 datasets = group("Describe, verify, export, split a data set.")

@@ -303,7 +303,7 @@ def _print_life(result: LifeDemo) -> None:
         for r in values["rows"]
     ]  # fmt: skip
     print_table(("flights", "diagnosis", "remain", "90 %", "truth"), rows)
-    _print_steps(values["steps"], result.seconds)
+    _print_steps(values["steps"], values["wall_s"])
     _print_checks(result.checks)
     say(f"report: {result.folder / 'report.html'}")
 

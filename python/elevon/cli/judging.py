@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from elevon.cli import common
-from elevon.cli.output import answer, listed, print_table, progress_bar, say
-from elevon.cli.shell import REPORT, Answer, DoorCall, command, printer
+from elevon.cli.output import answer, listed, print_result, print_table, progress_bar, say
+from elevon.cli.shell import REPORT, Answer, DoorCall, command, result_command
 from elevon.errors import InputError
-from elevon.number_text import estimate_row, quantity_text, severity_texts
 from elevon.option import Option
 
 if TYPE_CHECKING:
     from elevon.calibrate.outcome import Calibration
-    from elevon.calibrate.validation import Validation
-    from elevon.diagnose.engine.answer import Cause, Diagnosis
+    from elevon.diagnose.engine.answer import Diagnosis
     from elevon.diagnose.learning.model import LearnedModel
     from elevon.doctor import Examination
-    from elevon.nexttest import NextTest
     from elevon.prognose.history import NextEntry
 
 _DOCTOR_FILES = ("doctor.html", "doctor.json", "map.toml")
@@ -56,7 +52,7 @@ def calibrate(
     if out is not None:
         say(f"set: {result.write_actuator(out, force=force)}")
     data = result.to_dict(stored=False) | {"out": None if out is None else str(out)}
-    return Answer(data, lambda: _print_calibration(result), page=result.report)
+    return Answer(data, lambda: print_result(result), page=result.report)
 
 
 def _effort_scale(settings: list[str] | None) -> tuple[list[str], str | None]:
@@ -82,52 +78,16 @@ def _paths(free: list[str] | None) -> list[str] | None:
     return names
 
 
-def _print_calibration(result: Calibration) -> None:
-    answer(result.headline)
-    rows = [estimate_row(item, result.before, item.register) for item in result.estimates]
-    columns = ("parameter", "before", "after", "low", "high", "unit", "register", "holds for")
-    print_table(columns, rows, optional=("register",))
-    listed(result.remarks)
-
-
-@printer("elevon.calibrate.door:validate", *REPORT, "date", working="validating")
-def validate(result: Validation) -> None:
-    """Compare the model with logs, signal by signal; exit 1 where a threshold fails."""
-    answer(result.headline)
-    rows = [
-        (
-            e.log,
-            e.signal,
-            quantity_text(e.rms, e.unit, 4)[0],
-            *quantity_text(e.largest, e.unit, 4),
-            f"{e.of_rms:.3g}",
-            f"{e.of_range:.3g}",
-            "" if e.of_rms_away is None else f"{e.of_rms_away:.3g}",
-            "" if e.limit is None else f"{e.limit:.3g}",
-            "" if e.passed is None else "pass" if e.passed else "FAIL",
-        )
-        for e in result.errors
-    ]
-    away = "% away"
-    columns = ("log", "signal", "RMS", "max", "unit", "% of RMS", "% of range", away, "limit %", "")
-    print_table(columns, rows, optional=(away,))
-    listed([_sensor_text(name, offset) for name, offset in result.offsets.items()])
-    answer(
-        "% of RMS: RMS error over the logged signal's RMS about its mean; "
-        f"% of range: over its range; {away}: % of RMS without the 20 ms about corners "
-        f"and steps of the command; after {result.transient:g} s"
-    )
-    listed([f"{name}: {text}" for name, text in result.notes.items()])
-
-
-def _sensor_text(name: str, value: float) -> str:
-    """Say in words what a log's sensor adds: an offset, a delay or a filter."""
-    channel, _, kind = name.rpartition("_")
-    if kind == "delay" and channel:
-        return f"{channel}: the log shows it {1e3 * value:.3g} ms late"
-    if kind == "lag" and channel:
-        return f"{channel}: the log shows it behind a filter of {1e3 * value:.3g} ms"
-    return f"{name}: the sensor's offset of {value:.4g} is taken off the logs"
+validate = result_command(
+    "elevon.calibrate.door:validate",
+    "Compare the model with logs, signal by signal; exit 1 where a threshold fails.",
+    *REPORT, "date", working="validating",
+)  # fmt: skip
+next_test = result_command(
+    "elevon.nexttest.door:next_test",
+    "Propose the bench's test with the largest expected information on what is ambiguous.",
+    working="weighing tests", arguments=0,
+)  # fmt: skip
 
 
 @command(
@@ -166,43 +126,8 @@ def doctor(
     if out is not None:
         for path in result.write(out, force=force):
             say(f"wrote {path}")
-    return Answer(result, lambda: _print_examination(result, out), 1 if result.failed else 0)
-
-
-def _print_examination(result: Examination, out: Path | None) -> None:
-    answer(result.headline)
-    rows = [(c.log, c.check, "ok" if c.ok else "look", c.text) for c in result.checks]
-    print_table(("log", "data", "", "what was seen"), rows)
-    if result.columns_by == "guess":
-        first = [c for c in result.columns if c.log == result.columns[0].log]
-        columns = [(c.name, c.role or "?", c.unit, c.why) for c in first]
-        print_table(("column", "guessed as", "unit", "why"), columns)
-    if result.fit is not None:
-        fit = [
-            (e.log, e.signal, f"{e.of_range:.3g}", "" if e.limit is None else f"{e.limit:.3g}")
-            for e in result.fit.errors
-        ]
-        print_table(("log", "model beside it", "% of range", "threshold %"), fit)
-    listed([f"no {name}: {text}" for name, text in result.reasons.items()])
-    if out is None:
-        answer("one page of all this: --out DIR")
-
-
-@printer("elevon.nexttest.door:next_test", working="weighing tests", arguments=0)
-def next_test(result: NextTest) -> None:
-    """Propose the bench's test with the largest expected information on what is ambiguous."""
-    answer(result.headline)
-    tests = [
-        (t.name, f"{t.information:.3f}", f"{t.duration:g}", f"{t.rate:.2g}",
-         "yes" if t.standard else "no")
-        for t in result.tests
-    ]  # fmt: skip
-    columns = ("test", "expected [bit]", "takes [s]", "[bit/min]", "healthy log at hand")
-    print_table(columns, tests)
-    possible = result.possible[:10]
-    rows = [(" and ".join(p.faults) or "healthy", f"{p.probability:.3f}") for p in possible]
-    print_table(("still possible", "probability"), rows)
-    listed(result.findings)
+    more = () if out is not None else ("one page of all this: --out DIR",)
+    return Answer(result, lambda: print_result(result, *more), 1 if result.failed else 0)
 
 
 @command(None, *REPORT, door="elevon.diagnose.door:diagnose")
@@ -229,7 +154,7 @@ def diagnose(
     entry = _next_entry(append, usage, unit.name, force=force)
     result: Diagnosis = door(actuator=unit)
     code = 0 if entry is None else _add_to_history(entry, result)
-    return Answer(result, lambda: _print_diagnosis(result), code, page=result.report)
+    return Answer(result, code=code, page=result.report)
 
 
 def _next_entry(
@@ -252,31 +177,6 @@ def _add_to_history(inspection: NextEntry, result: Diagnosis) -> int:
         say(f"elevon: {error}")
         return 1
     return 0
-
-
-def _print_diagnosis(result: Diagnosis) -> None:
-    from elevon.diagnose.engine.page import by_reason, folded, sentence
-
-    answer(result.headline)
-    rows = [
-        (
-            f"{c.kind}@{c.place}",
-            f"{c.probability:.3f}",
-            *_severity_cells(c),
-            ", ".join(folded(c)),
-        )
-        for c in result.faults
-    ]
-    print_table(("cause", "probability", "severity", "low", "high", "ambiguous with"), rows)
-    unseen = [f"not observable: {n}: {reason}" for n, reason in by_reason(result.unobservable)]
-    listed([*result.findings, sentence(result), *unseen])
-
-
-def _severity_cells(cause: Cause) -> tuple[str, str, str]:
-    """A severity with its interval; a class may have none."""
-    if math.isnan(cause.severity):
-        return "-", "-", "-"
-    return severity_texts(cause.severity, cause.interval, cause.unit)
 
 
 _FALSE_ALARM_RATE = 0.05  # of false alarms, by default

@@ -16,11 +16,16 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from elevon.cli import interrupt
 from elevon.plain import plain
 from elevon.results import finite
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from elevon.results import Result
 
 
 def print_json(value: Mapping[str, Any]) -> None:
@@ -38,6 +43,7 @@ def print_table(
     *,
     title: str | None = None,
     optional: Sequence[str] = (),
+    fitted: bool = False,
 ) -> None:
     """Write a table on stdout: fitted to a terminal, one line a row for a pipe.
 
@@ -51,9 +57,11 @@ def print_table(
         Above it.
     optional : sequence of str
         Columns that may be left out where the terminal is too narrow, the first one first.
+    fitted : bool
+        Whether it is fitted without a terminal, too: to 80 columns, or those of COLUMNS.
     """
     terminal = sys.stdout.isatty()
-    width = shutil.get_terminal_size().columns if terminal else None
+    width = shutil.get_terminal_size().columns if terminal or fitted else None
     lines = table_lines(columns, rows, width, optional)
     if terminal and "NO_COLOR" not in os.environ:
         lines[0] = f"\033[1m{lines[0]}\033[0m"
@@ -88,6 +96,14 @@ def listed(lines: Sequence[str]) -> None:
     answer(*few)
     if len(few) < len(lines):
         answer(f"and {len(lines) - len(few)} more: --details")
+
+
+def print_result(result: Result, *more: str, file: Path | None = None) -> None:
+    """Write a result on stdout: its answer, further lines of it, its tables, its remarks."""
+    answer(result.headline if file is None else f"{result.headline} -> {file}", *more)
+    for table in result.text_tables():
+        print_table(table.columns, table.rows, title=table.caption or None, optional=table.optional)
+    listed(result.remarks)
 
 
 def say(message: str) -> None:

@@ -311,6 +311,11 @@ def plot(
     """
     from elevon.logs.read import Answers
 
+    if file.suffix.lower() == ".toml":
+        raise InputError(
+            f"{file}: is an actuator or a scenario, not a recording; elevon show {file} --svg "
+            "FILE draws an actuator's diagram, elevon simulate --plot FILE what it does"
+        )
     targets = _targets(file, out)
     common.check_outputs(targets, force=force)
     if file.suffix.lower() == ".json":

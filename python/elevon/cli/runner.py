@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import importlib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -131,7 +132,7 @@ def _code(arguments: list[str], module: str, program: str) -> int:
     except Interrupted:
         raise
     except UsageError as error:
-        return _usage(error)
+        return _usage(error, arguments)
     except (ElevonError, ElevonWarning) as error:
         interrupt.check()
         return _fail(str(error), error.exit_code)
@@ -191,13 +192,24 @@ def _story(written: Sequence[Path], most: int = 4) -> str:
     )
 
 
-def _usage(error: Any) -> int:
+def _usage(error: Any, arguments: Sequence[str]) -> int:
     context, message = getattr(error, "ctx", None), error.format_message()
     if context is not None:
         typer.echo(context.get_usage(), err=True)
+        name = context.command_path.partition(" ")[2]
         option = getattr(error, "option_name", "")
-        about = remark("option", f"{context.command_path.partition(' ')[2]} {option}")
+        about = remark("option", f"{name} {option}")
         message = f"No such option: {option}; {about}" if about else message
+        if extra := re.fullmatch(r"Got unexpected extra arguments?(?:\(s\))? \((\S+)\)", message):
+            place = arguments.index(extra[1])
+            about = remark("argument", f"{name} {arguments[place - 1]}")
+            message = f"{message}; {about}" if about else message
+    missing = getattr(error, "param", None)
+    if missing is not None and missing.name == "actuator" and message.startswith("Missing"):
+        from elevon.actuator import list_actuators
+
+        known = ", ".join(list_actuators())
+        message = f"{message.rstrip('.')}: {known}, or a file; elevon list actuators"
     return _fail(message, USAGE)
 
 

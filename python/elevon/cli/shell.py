@@ -28,7 +28,7 @@ from elevon.cli.options import (
     leading_text,
     own_parameters,
 )
-from elevon.cli.output import print_json, progress_bar, say
+from elevon.cli.output import print_json, print_result, progress_bar, say
 from elevon.errors import BudgetError
 from elevon.files import check_output
 from elevon.report import Report
@@ -46,8 +46,8 @@ class Answer:
     ----------
     data : mapping or Result
         What ``--json`` prints.
-    show : callable
-        Prints it for a person.
+    show : callable, optional
+        Prints it for a person; default: the result as every one is printed.
     code : int
         Exit code.
     page : callable, optional
@@ -55,9 +55,19 @@ class Answer:
     """
 
     data: Mapping[str, Any] | Result
-    show: Callable[[], None]
+    show: Callable[[], None] | None = None
     code: int = 0
     page: Callable[..., Report] | None = None
+
+    def print(self, *, json: bool) -> None:
+        """Write it on stdout."""
+        data = self.data
+        if json:
+            print_json(data.to_dict(stored=False) if isinstance(data, Result) else data)
+        elif self.show is not None:
+            self.show()
+        elif isinstance(data, Result):
+            print_result(data)
 
 
 @dataclass(frozen=True)
@@ -130,8 +140,8 @@ class TerminalCommand:
         Shown while the door works.
     without : tuple of str
         Parameters of the door that the command has no option for.
-    prints : bool
-        Whether `work` only prints the result of the door.
+    help : str
+        Of a command that only prints the result of its door; empty: the docstring of `work`.
     arguments : int
         How many of the door's first parameters are arguments; the others are options.
     """
@@ -141,7 +151,7 @@ class TerminalCommand:
     door: str = ""
     working: str = ""
     without: tuple[str, ...] = ()
-    prints: bool = False
+    help: str = ""
     arguments: int = 1
 
     def app(self) -> typer.Typer:
@@ -156,7 +166,7 @@ class TerminalCommand:
 
     def _shell(self) -> Callable[..., int]:
         call_name = next(iter(inspect.signature(self.work).parameters), "") if self.door else ""
-        own_options = [] if self.prints else own_parameters(self.work, without=[call_name])
+        own_options = [] if self.help else own_parameters(self.work, without=[call_name])
         names = {item.name for item in own_options}
         door, of_door = None, []
         if self.door:
@@ -185,26 +195,25 @@ class TerminalCommand:
             if report is not None and result.page is not None:
                 page = result.page(date=options["date"]) if "date" in extra else result.page()
                 say(f"report: {page.save(report, force=force)}")
-            if options["json"]:
-                data = result.data
-                print_json(data.to_dict(stored=False) if isinstance(data, Result) else data)
-            else:
-                result.show()
+            result.print(json=options["json"])
             return result.code
 
-        doc = inspect.getdoc(self.work) or inspect.getdoc(door) or ""
-        shell.__doc__ = leading_text(doc) if inspect.getdoc(self.work) else doc.partition("\n\n")[0]
+        doc = (
+            self.help
+            or inspect.getdoc(self.work)
+            or (inspect.getdoc(door) or "").partition("\n\n")[0]
+        )
+        shell.__doc__ = leading_text(doc)
         return _signed(shell, parameters)
 
     def _answer(self, call: DoorCall | None, own_options: dict[str, Any]) -> Answer:
         if call is None:
             return cast("Answer", self.work(**own_options))
-        if not self.prints:
+        if not self.help:
             return cast("Answer", self.work(call, **own_options))
-        result = call()
+        result: Result = call()
         code = 1 if getattr(result, "status", "") == "fail" else 0
-        page = result.report if "report" in self.shared else None
-        return Answer(result, lambda: self.work(result), code, page)
+        return Answer(result, None, code, result.report if "report" in self.shared else None)
 
 
 def command(
@@ -241,19 +250,15 @@ def command(
     return make
 
 
-def printer(
+def result_command(
     door: str,
+    help: str,  # noqa: A002 - what it is everywhere
     *shared: str,
     working: str = "",
-    without: tuple[str, ...] = (),
     arguments: int = 1,
-) -> Callable[[Callable[[Any], None]], TerminalCommand]:
-    """Return a decorator for what prints a door's result: door and print are the command."""
-
-    def make(work: Callable[[Any], None]) -> TerminalCommand:
-        return TerminalCommand(work, shared, door, working, without, True, arguments)
-
-    return make
+) -> TerminalCommand:
+    """Return the command that runs a door and prints its result; arguments as `TerminalCommand`."""
+    return TerminalCommand(print_result, shared, door, working, (), help, arguments)
 
 
 def add_plain(

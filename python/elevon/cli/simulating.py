@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from elevon.cli import common
 from elevon.cli.groups import group
-from elevon.cli.output import answer, print_table, progress_bar, say
+from elevon.cli.output import answer, print_result, print_table, progress_bar, say
 from elevon.cli.shell import Answer, DoorCall, command
 from elevon.errors import InputError, unknown
 from elevon.option import Option
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from elevon.compare import Comparison
     from elevon.loads.table import LoadTable
     from elevon.recording import Recording
-    from elevon.response import FrequencyResponse, LoopResponse, Margin
+    from elevon.response import FrequencyResponse, LoopResponse
     from elevon.scenario import Scenario
     from elevon.simulate import Run
 
@@ -215,26 +215,7 @@ def compare(
     if page is not None:
         report = compare_report(result, options["actuator"], date=options["date"])
         say(f"report: {report.save(page, force=force)}")
-    return Answer(result, lambda: _print_comparison(result))
-
-
-def _print_comparison(result: Comparison) -> None:
-    values = result.to_dict(stored=False)
-    answer(result.headline)
-    runs = values["loads"] or {"": values}
-    lines = (
-        ("output position", "position_nrmse", ".3%", "of the amplitude"),
-        ("motor speed", "speed_nrmse", ".3%", "of its RMS"),
-        ("torque current", "q_current_nrmse", ".3%", "of its RMS"),
-        ("reduced-order model", "low_realtime_factor", ".0f", "times real time"),
-        ("speed-up", "speed_up", ".0f", "times the switching model"),
-    )
-    rows = [
-        [name, *(f"{run[key]:{form}} {what}".replace("%", " %") for run in runs.values())]
-        for name, key, form, what in lines
-    ]
-    print_table(["RMS of low less high", *runs], rows)
-    answer(f"after {values['start_s']:g} s; {values['filter']}")
+    return Answer(result)
 
 
 def _faults_table(model: Actuator, moved: Scenario, start: float, seed: int) -> Answer:
@@ -282,58 +263,7 @@ def response(door: DoorCall, *, plot: Path | None = None, force: bool = False) -
     data = measured.to_dict(stored=False)
     optional = ("linear", "band")
     data = {n: value for n, value in data.items() if n not in optional or value is not None}
-    return Answer(data, lambda: _print_response(measured))
-
-
-def _print_response(measured: FrequencyResponse | LoopResponse) -> None:
-    from elevon.response import LoopResponse
-
-    answer(measured.headline)
-    if isinstance(measured, LoopResponse):
-        _print_margins(measured)
-    else:
-        _print_points(measured)
-
-
-def _margin_value(margin: Margin) -> str:
-    unknown = "not known" if margin.interval else "not reached"
-    return unknown if margin.value is None else f"{margin.value:.4g}"
-
-
-def _print_margins(measured: LoopResponse) -> None:
-    """Print the margins with their intervals, and what to think of them."""
-    margins, linear = measured.margins, measured.linear
-    head, rows = ["margin", "value", "low", "high", "unit", "at [Hz]"], []
-    for name, field, unit in (
-        ("crossover", "crossover", "Hz"),
-        ("phase margin", "phase", "deg"),
-        ("gain margin", "gain", "dB"),
-        ("disk margin", "disk", "1"),
-    ):
-        margin = getattr(margins, field)
-        ends = ["", ""] if margin.interval is None else [f"{x:.4g}" for x in margin.interval]
-        at = "" if margin.frequency is None else f"{margin.frequency:.3g}"
-        linear_value = [] if linear is None else [_margin_value(getattr(linear, field))]
-        rows.append([name, _margin_value(margin), *ends, unit, at, *linear_value])
-    print_table((*head, *([] if linear is None else ["linear loop"])), rows)
-    if measured.hint:
-        answer(measured.hint)
-
-
-def _print_points(measured: FrequencyResponse) -> None:
-    model, data = measured.linear, measured.to_dict()
-    columns = ("frequency [Hz]", "gain [dB]", "phase [deg]", "coherence", "gain +- [%]")
-    keys = ("frequency_hz", "gain_db", "phase_deg", "coherence")
-    numbers = zip(*(data[key] for key in keys), 100.0 * 1.645 * measured.std, strict=True)
-    formats = ("{:.4g}", "{:.2f}", "{:.1f}", "{:.3f}", "{:.1f}")
-    rows = [[f.format(x) for f, x in zip(formats, row, strict=True)] for row in numbers]
-    print_table(columns, rows)
-    if model is not None:
-        poles = [f"{x.real:.4g}{f'{x.imag:+.4g}j' if x.imag else ''}" for x in model.poles]
-        answer(f"linear model: {model.order} states, error {model.error:.2g}")
-        answer(f"poles [1/s]: {', '.join(poles)}")
-    if measured.band is not None:
-        answer(measured.band.text)
+    return Answer(data, lambda: print_result(measured))
 
 
 @command(

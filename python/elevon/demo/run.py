@@ -1,4 +1,8 @@
-"""The demonstration: a unit lives, is inspected and diagnosed, and its end is predicted."""
+"""The demonstration: a unit lives, is inspected and diagnosed, and its end is predicted.
+
+The unit that nobody knows has values of its own, grows worse by laws that the prediction has not,
+and shows nothing but the logs of its drive.
+"""
 
 from __future__ import annotations
 
@@ -6,125 +10,113 @@ import json
 import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+import elevon
+from elevon.actuator import Actuator
 from elevon.calibrate.outcome import Calibration
-from elevon.demo.story import FinishedSteps, Story, Work, inputs_of, work_key
+from elevon.demo.story import Story
 from elevon.demo.unit import (
-    HELD_OUT,
     INSPECTED,
+    demo_file,
     demo_mission,
-    demo_procedure,
     faults_at,
     hidden_unit,
     live,
-    mission_file,
     of_day,
 )
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.errors import Interrupted, OutputExistsError
-from elevon.logs.log import Log
+from elevon.files import check_output, write_text
+from elevon.plain import WORKING, Plain
 from elevon.prognose import (
-    GrowthFilter,
     Inspection,
-    Process,
     Prognosis,
     ResponseTables,
+    inspection,
     respond,
-)
+)  # fmt: skip
 from elevon.prognose.future import Life
+from elevon.prognose.history import write_stamp
 from elevon.prognose.metrics import Track, cumulative_relative_accuracy
+from elevon.prognose.predict import predict_by_tables
 from elevon.progress import Progress, part
-from elevon.report.checks import Check
+from elevon.report.checks import Check, verdict
 
-_PAGES = (
-    "report.html",
-    "calibrated.toml",
-    "mission.toml",
-    "truth.json",
-    "cone.svg",
-    "mechanism.svg",
-)
+_FILES = (
+    "report.html", "prognosis.html", "diagnosis.html", "calibrated.toml", "mission.toml",
+    "truth.json", "cone.svg", "mechanism.svg",
+)  # fmt: skip
 _UNIT = "torino-rotary SN 0042"
 _TEST = "backlash"
+_TRACES = ("sine", "chirp", "loaded")
 
 
 @dataclass(frozen=True)
-class Statement:
-    """What a diagnosis says, as it is kept.
-
-    Attributes
-    ----------
-    data : dict
-        Its JSON form.
-    text : str
-        In words.
-    """
-
-    data: dict[str, Any]
-    text: str
-
-    @classmethod
-    def of(cls, answer: Diagnosis) -> Statement:
-        """Take it from the whole answer."""
-        from elevon.diagnose.engine.page import sentence
-
-        return cls(answer.to_dict(), sentence(answer))
-
-    @property
-    def status(self) -> str:
-        """``healthy`` or ``faulty``."""
-        return str(self.data["status"])
-
-    @property
-    def best(self) -> list[str]:
-        """Faults of the best explanation, ``KIND@PLACE``."""
-        return list(self.data["best"]["faults"])
-
-
-@dataclass(frozen=True)
-class InspectionVisit:
+class InspectionVisit(Plain):
     """One inspection.
 
     Attributes
     ----------
     usage : float
-        Flights.
-    log : Path
-        What the bench wrote.
-    diagnosis : Statement
-        Of it.
-    inspection : Inspection
-        As the filter takes it.
-    prognosis : Prognosis
-        From all inspections up to this one.
+        Flights until then.
+    status : str
+        Of the diagnosis.
+    faults : tuple of str
+        ``KIND@PLACE`` of its best explanation.
+    rul, low, high : float
+        Remaining flights by all inspections so far: median and 90 % interval.
+    truth : float
+        Remaining flights as they came.
+    diagnosis, inspection, prognosis
+        The answers themselves.
     """
 
     usage: float
-    log: Path
-    diagnosis: Statement
-    inspection: Inspection
-    prognosis: Prognosis
+    status: str
+    faults: tuple[str, ...]
+    rul: float
+    low: float
+    high: float
+    truth: float
+    diagnosis: Annotated[Diagnosis, WORKING]
+    inspection: Annotated[Inspection, WORKING]
+    prognosis: Annotated[Prognosis, WORKING]
 
 
 @dataclass
-class LifeDemo(Story):
-    """Everything the report shows.
+class LifeDemo:
+    """Everything the page shows.
 
     Attributes
     ----------
+    seed : int
+        Of the hidden values and of chance.
+    base, hidden : Actuator
+        The published set, and the unit on the bench.
+    folder : Path
+        Of the outputs.
+    story : Story
+        The steps, with their times.
     life : Life
         The true course.
     calibration : Calibration
         The healthy unit as its logs show it.
     response : ResponseTables
-        The calibrated unit's tables.
+        What severities do to the calibrated unit.
+    healthy : list of Path
+        Logs of the new unit by the test of the inspections.
     visits : list of InspectionVisit
         In the order of flights.
     """
 
+    seed: int
+    base: Actuator
+    hidden: Actuator
+    folder: Path
+    story: Story
     life: Life = field(init=False)
     calibration: Calibration = field(init=False)
     response: ResponseTables = field(init=False)
@@ -134,20 +126,9 @@ class LifeDemo(Story):
     @property
     def track(self) -> Track:
         """The predictions against the end that came."""
-        rows = [(v.usage, v.prognosis.median, *v.prognosis.interval) for v in self.visits]
+        rows = [(v.usage, v.rul, v.low, v.high) for v in self.visits]
         usage, median, low, high = np.array(rows).T
         return Track(usage, median, low, high, self.life.end)
-
-    @property
-    def accuracy(self) -> float:
-        """Mean relative accuracy over 50 to 90 % of life."""
-        return cumulative_relative_accuracy(self.track, (0.5, 0.6, 0.7, 0.8, 0.9))
-
-    @property
-    def inside(self) -> float:
-        """Share of the predictions whose 90 % interval holds the true end of life."""
-        track = self.track
-        return float(np.mean((track.low <= track.true) & (track.true <= track.high)))
 
     @property
     def checks(self) -> list[Check]:
@@ -156,7 +137,7 @@ class LifeDemo(Story):
         `python -m studies prognosis` requests accuracy and coverage, of sixty lives.
         """
         track = self.track
-        named = np.mean([v.diagnosis.status == "faulty" for v in self.visits[1:]])
+        named = np.mean([v.status == "faulty" for v in self.visits[1:]])
         width = (track.high - track.low)[[len(track.usage) // 3, -1]]
         return [
             Check("last interval's width over that at a third of the inspections",
@@ -167,29 +148,20 @@ class LifeDemo(Story):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form."""
+        track = self.track
         return {
-            **self.summary(self.checks),
+            **verdict(self.checks),
+            "seed": self.seed,
+            "steps": [step.to_dict() for step in self.story.steps],
+            "wall_s": self.story.seconds,
+            "report": str(self.folder / "report.html"),
             "end": self.life.end,
-            "cumulative_relative_accuracy": self.accuracy,
-            "inside": self.inside,
-            "rows": [
-                {
-                    "usage": v.usage,
-                    "status": v.diagnosis.status,
-                    "faults": v.diagnosis.best,
-                    "rul": v.prognosis.median,
-                    "low": v.prognosis.interval[0],
-                    "high": v.prognosis.interval[1],
-                    "truth": self.life.end - v.usage,
-                }
-                for v in self.visits
-            ],
+            "cumulative_relative_accuracy": cumulative_relative_accuracy(
+                track, (0.5, 0.6, 0.7, 0.8, 0.9)
+            ),
+            "inside": float(np.mean((track.low <= track.true) & (track.true <= track.high))),
+            "rows": [visit.to_dict() for visit in self.visits],
         }
-
-
-def life_files(out: str | Path) -> list[Path]:
-    """Return the files the demonstration writes beside its logs and its history."""
-    return [Path(out).expanduser() / name for name in _PAGES]
 
 
 def run_life(
@@ -199,7 +171,7 @@ def run_life(
     force: bool = False,
     progress: Progress | None = None,
 ) -> LifeDemo:
-    """Run the demonstration and write its report.
+    """Run the demonstration and write its page.
 
     A run that was interrupted goes on where it stopped when it is started again with the same
     arguments, with what is finished.
@@ -222,166 +194,120 @@ def run_life(
     Interrupted
         `progress` returned False.
     """
-    from elevon.actuator import Actuator
-
     base = Actuator.load("torino-rotary")
-    folder = Path(out).expanduser()
-    hidden = hidden_unit(base, seed)
-    demo = LifeDemo(seed, base, hidden, folder, FinishedSteps(folder, work_key(seed, base, hidden)))
+    hidden, folder = hidden_unit(base, seed), Path(out).expanduser()
+    story = Story(folder, f"{elevon.__version__} {seed} {base.hash} {hidden.hash}")
+    demo = LifeDemo(seed, base, hidden, folder, story)
     _claim(demo, force=force)
-    demo.life = demo.resumed(
-        "the unit flies until it fails (high-fidelity snapshots)",
-        Work(
-            "life",
-            lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
-            Life,
-        ),
-    )
+    demo.life = story.kept(
+        "the unit flies until it fails (high-fidelity snapshots)", "life", Life,
+        lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
+    )  # fmt: skip
     _calibrate(demo, part(progress, 0.15, 0.4))
-    _tables(demo, part(progress, 0.4, 0.5))
+    tables = part(progress, 0.4, 0.5)
+    demo.response = story.timed(
+        "model runs: what severities do to the mission and its requirements",
+        lambda: respond(demo.calibration.actuator, demo_mission(), snapshots=True, progress=tables),
+    )
     _inspect(demo, part(progress, 0.5, 0.97))
     _finish(demo, force=force)
-    demo.finished.clear()
+    story.clear()
     if progress is not None:
         progress(1.0)
     return demo
 
 
 def _claim(demo: LifeDemo, *, force: bool) -> None:
-    """Refuse what may not be replaced; clear what earlier work left; or go on with this work."""
-    from elevon.files import check_output
-
-    if demo.finished.begun(force=force):
-        check_output(demo.folder / "report.html", force=force)
+    """Go on with this very work, or refuse what may not be replaced and clear the rest."""
+    for name in _FILES[:1] if demo.story.resumes else _FILES:
+        check_output(demo.folder / name, force=force)
+    if demo.story.resumes:
         return
-    for path in life_files(demo.folder):
-        check_output(path, force=force)
-    for name in ("logs", "history"):
-        place = demo.folder / name
+    for place in (demo.folder / "logs", demo.folder / "history"):
         if place.exists() and any(place.iterdir()):
             if not force:
-                raise OutputExistsError(f"{place}: is there; use force (--force) to replace it")
+                raise OutputExistsError(f"{place}: is there, of other work")
             shutil.rmtree(place)
-    demo.finished.begin()
+    demo.story.begin()
 
 
 def _log(demo: LifeDemo, name: str, usage: float, number: int) -> Path:
     """Put the unit on the bench as it is at a use; return the log."""
-    from elevon.bench.procedure import load_procedure
-    from elevon.bench.run import run_procedure
-
-    rng = np.random.default_rng([demo.seed, 10, number])
-    result = run_procedure(
-        load_procedure(_TEST),
-        of_day(demo.hidden, rng),
-        demo.folder / "logs" / name,
-        faults=faults_at(demo.life, usage),
-        seed=1000 * demo.seed + number,
-    )
-    return next(path for path in result.logs[0].files if path.suffix == ".csv")
+    unit = of_day(demo.hidden, np.random.default_rng([demo.seed, 10, number]))
+    faults, seed = faults_at(demo.life, usage), 1000 * demo.seed + number
+    result = elevon.bench(_TEST, unit, demo.folder / "logs" / name, faults=faults, seed=seed)
+    return result.paths[0]
 
 
 def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
-    """Take the healthy logs and calibrate on three of them."""
-    from elevon.bench.run import run_procedure
-    from elevon.calibrate import calibrate
-    from elevon.calibrate.write import write_calibration
-    from elevon.logs.read import read_drive_logs
+    """Put the new unit on the bench and calibrate on its logs."""
+    logs, target = demo.folder / "logs" / "healthy", demo.folder / "calibrated.toml"
+    files = [logs / f"{name}.csv" for name in _TRACES]
 
-    logs = demo.folder / "logs" / "healthy"
-
-    def bench() -> None:
-        run_procedure(
-            demo_procedure(), demo.hidden, logs, seed=demo.seed, progress=part(progress, 0.0, 0.4)
-        )
-        demo.healthy = [_log(demo, f"healthy-{k}", 0.0, 900 + k) for k in (1, 2)]
-
-    demo.timed("virtual bench: logs of the new unit", bench)
-
-    target = demo.folder / "calibrated.toml"
-    names = [trace.name for trace in demo_procedure().traces if trace.name != HELD_OUT]
-    files = [logs / f"{name}.csv" for name in names]
+    def bench() -> list[Path]:
+        elevon.bench(demo_file("bench.toml"), demo.hidden, logs, seed=demo.seed,
+                     progress=part(progress, 0.0, 0.4))  # fmt: skip
+        return [_log(demo, f"healthy-{k}", 0.0, 900 + k) for k in (1, 2)]
 
     def work() -> Calibration:
-        used = read_drive_logs(files, one_rate=False)
-        result = calibrate(used, demo.base, progress=part(progress, 0.4, 1.0))
-        write_calibration(target, result, force=True)
+        result = elevon.calibrate(files, demo.base, progress=part(progress, 0.4, 1.0))
+        result.write_actuator(target, force=True)
         return result
 
-    demo.calibration = demo.resumed(
-        "calibration on the first healthy logs",
-        Work("calibration", work, Calibration, inputs_of(files), [target]),
-    )
-
-
-def _tables(demo: LifeDemo, progress: Progress | None) -> None:
-    demo.response = demo.timed(
-        "model runs: what severities do to the mission and its requirements",
-        lambda: respond(
-            demo.calibration.actuator, demo_mission(), snapshots=True, progress=progress
-        ),
-    )
+    demo.healthy = demo.story.timed("virtual bench: logs of the new unit", bench)
+    name = "calibration on the first healthy logs"
+    demo.calibration = demo.story.kept(name, "calibration", Calibration, work, [*files, target])
 
 
 def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
     """Inspect, diagnose and predict, at irregular uses, until the unit has failed."""
-    from elevon.logs.read import read_drive_logs
-
     rng = np.random.default_rng([demo.seed, 11])
-    baselines = read_drive_logs(demo.healthy, one_rate=False)
-    flt = GrowthFilter(Process(demo.response), seed=demo.seed)
-    usage, number = 0.0, 0
+    usage = 0.0
     while True:
-        number += 1
         usage += round(INSPECTED * rng.uniform(0.7, 1.3), -1)
         if usage >= demo.life.end:
             return
-        _visit(demo, baselines, flt, usage, number)
-        if progress is not None and progress(min(usage / demo.life.end, 1.0)) is False:
+        demo.visits.append(_visit(demo, usage))
+        if progress is not None and progress(usage / demo.life.end) is False:
             raise Interrupted("interrupted between two inspections")
 
 
-def _visit(demo: LifeDemo, baselines: list[Log], flt: Any, usage: float, number: int) -> None:
-    from elevon.diagnose.by_model import diagnose
-    from elevon.logs.read import read_drive_logs
-    from elevon.prognose.history import write_stamp
-    from elevon.prognose.observation import inspection
-    from elevon.prognose.predict import prognosis
-
-    log = demo.timed(
-        "virtual bench: a log at each inspection",
-        lambda: _log(demo, f"flight-{usage:05.0f}", usage, number),
-    )
+def _visit(demo: LifeDemo, usage: float) -> InspectionVisit:
+    """Inspect the unit once."""
+    number, name = len(demo.visits) + 1, f"flight-{usage:05.0f}"
     actuator = demo.calibration.actuator
-    statement = demo.resumed(
-        "diagnosis of each log",
-        Work(
-            f"inspection-{number}",
-            lambda: Statement.of(diagnose(read_drive_logs([log]), actuator, baselines=baselines)),
-            Statement,
-            inputs_of([log, *demo.healthy], actuator.hash),
+    log = demo.story.timed(
+        "virtual bench: a log at each inspection", lambda: _log(demo, name, usage, number)
+    )
+    diagnosis = demo.story.kept(
+        "diagnosis of each log", f"inspection-{number}", Diagnosis,
+        lambda: elevon.diagnose(log, actuator, baselines=demo.healthy),
+        [log, *demo.healthy, demo.folder / "calibrated.toml"],
+    )  # fmt: skip
+    data = diagnosis.to_dict(stored=False)
+    seen = inspection(data, demo.response.laws, usage=usage, name=name)
+    every = [*(visit.inspection for visit in demo.visits), seen]
+    result = demo.story.timed(
+        "prediction at each inspection",
+        lambda: predict_by_tables(
+            every, demo_mission(), demo.response, seed=demo.seed, serial=_UNIT
         ),
     )
-    seen = inspection(statement.data, demo.response.laws, usage=usage, name=log.parent.name)
-
-    def look() -> Prognosis:
-        flt.update(seen)
-        past = [visit.inspection for visit in demo.visits]
-        return prognosis(flt, demo_mission(), [*past, seen], seed=demo.seed, serial=_UNIT)
-
-    result = demo.timed("prediction at each inspection", look)
-    demo.visits.append(InspectionVisit(usage, log, statement, seen, result))
-    stamp = demo.folder / "history" / f"flight-{usage:05.0f}.json"
-    write_stamp(stamp, statement.data, usage=usage, unit="flights", serial=_UNIT, force=True)
+    stamp = demo.folder / "history" / f"{name}.json"
+    write_stamp(stamp, data, usage=usage, unit="flights", serial=_UNIT, force=True)
+    return InspectionVisit(
+        usage, diagnosis.status, diagnosis.best, result.median, *result.interval,
+        demo.life.end - usage, diagnosis, seen, result,
+    )  # fmt: skip
 
 
 def _finish(demo: LifeDemo, *, force: bool) -> None:
     """Write what a user goes on with, the truth, and the page; `_claim` has checked first."""
-    from elevon.demo.page import cone_figure, life_report, moving_picture
-    from elevon.files import write_text
-    from elevon.report.figures import on_white, save_figure
+    from elevon.demo.page import cone_figure, moving_picture, save_pages
+    from elevon.report.figures import save_figure
 
-    write_text(demo.folder / "mission.toml", mission_file().read_text("utf-8"), force=True)
+    mission = demo_file("mission.toml").read_text("utf-8")
+    write_text(demo.folder / "mission.toml", mission, force=True)
     truth = {
         "end": demo.life.end,
         "usage": demo.life.usage.tolist(),
@@ -389,8 +315,7 @@ def _finish(demo: LifeDemo, *, force: bool) -> None:
         "faults": [law.key for law in demo.response.laws],
     }
     write_text(demo.folder / "truth.json", json.dumps(truth) + "\n", force=True)
-    report = demo.timed("drawing the page", lambda: life_report(demo))
     save_figure(cone_figure(demo), demo.folder / "cone.svg", force=True)
-    write_text(demo.folder / "mechanism.svg", on_white(moving_picture(demo)), force=True)
+    write_text(demo.folder / "mechanism.svg", moving_picture(demo), force=True)
     # Last: where it stands, the demonstration is complete.
-    report.save(demo.folder / "report.html", force=force)
+    demo.story.timed("drawing the pages", lambda: save_pages(demo, force=force))

@@ -13,37 +13,27 @@ import numpy as np
 from elevon.actuator import Actuator
 from elevon.arrays import Floats
 from elevon.bench.hidden import hidden_actuator
-from elevon.bench.procedure import Procedure, load_procedure
 from elevon.faults import Fault
-from elevon.prognose import Mission, Process, respond
+from elevon.prognose import Law, Mission, Process, respond
 from elevon.prognose.future import Life, run_to_failure
-from elevon.prognose.law import Law
 from elevon.progress import Progress
 
-HELD_OUT = "held-out"
-"""Name of the log that is kept from the calibration."""
 INSPECTED = 330.0
 """Flights between inspections, about."""
 FACTORS = (1.35, 0.7)
 """Of wear and friction on the laws the prediction starts from: this unit wears faster."""
 _GRAIN = 1.5  # of the truth's scatter over the law's
 _FEEDBACK = 0.5  # greatest relative rise of a truth's growth up to the greatest severity, linear
-_OWN_HEAT = (0.1, 0.3)  # median and deviation of the logarithm of a unit's over the law's
 
 
-def demo_procedure() -> Procedure:
-    """Return what is done on the bench: three logs to calibrate on, one kept back."""
-    return load_procedure(Path(str(files("elevon.demo") / "bench.toml")))
-
-
-def mission_file() -> Path:
-    """Return the file of the demonstration's mission."""
-    return Path(str(files("elevon.demo") / "mission.toml"))
+def demo_file(name: str) -> Path:
+    """Return a file of the demonstration: its bench procedure or its mission."""
+    return Path(str(files("elevon.demo") / name))
 
 
 def demo_mission() -> Mission:
     """Return the demonstration's mission."""
-    return Mission.load(mission_file())
+    return Mission.load(demo_file("mission.toml"))
 
 
 def hidden_unit(base: Actuator, seed: int) -> Actuator:
@@ -86,9 +76,6 @@ def live(unit: Actuator, seed: int, progress: Progress | None = None) -> Life:
 
 def other_law(law: Law, rng: np.random.Generator) -> Law:
     """Return the law as it truly is in one unit: another form, another scatter."""
-    if law.name == "insulation":
-        heat = law.coefficients["own_heat"].value * float(np.exp(rng.normal(*_OWN_HEAT)))
-        return replace(law.with_values({"own_heat": heat}), grain=_GRAIN * law.grain)
     believed, feedback = law.rate, rng.uniform(0.0, _FEEDBACK)
 
     def rate(damage: Floats, drivers: Mapping[str, Floats], c: Mapping[str, float]) -> Floats:

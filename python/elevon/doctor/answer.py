@@ -135,6 +135,27 @@ class Examination(Result):
         fit = "; the healthy log is over its threshold" if self.misfit else ""
         return f"{self._verdict()} ({data}{columns}{fit})"
 
+    def text_tables(self) -> list[ReportTable]:
+        """Return what was seen in the data, how columns were guessed, and the model's fit."""
+        rows = [(c.log, c.check, "ok" if c.ok else "look", c.text) for c in self.checks]
+        tables = [ReportTable(("log", "data", "", "what was seen"), rows)]
+        if self.columns_by == "guess":
+            first = [c for c in self.columns if c.log == self.columns[0].log]
+            columns = [(c.name, c.role or "?", c.unit, c.why) for c in first]
+            tables.append(ReportTable(("column", "guessed as", "unit", "why"), columns))
+        if self.fit is not None:
+            fit = [
+                (e.log, e.signal, f"{e.of_range:.3g}", "" if e.limit is None else f"{e.limit:.3g}")
+                for e in self.fit.errors
+            ]
+            tables.append(ReportTable(("log", "model beside it", "% of range", "threshold %"), fit))
+        return tables
+
+    @property
+    def remarks(self) -> list[str]:
+        """What could not be looked at, and why."""
+        return [f"no {name}: {text}" for name, text in self.reasons.items()]
+
     def _verdict(self) -> str:
         if self.verdict is not None:
             return self.verdict.headline

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from elevon.errors import InputError
-from elevon.faults.catalogue import find_record
+from elevon.faults.catalogue import catalogue, find_record
 from elevon.faults.profile import Profile, pairs
 from elevon.seam import CoreFault
 
@@ -22,6 +22,19 @@ _EXCLUSIVE = (
     frozenset({"open_phase", "short"}),
     frozenset({"open_switch", "shorted_switch"}),
 )
+
+
+def _placed(text: str) -> str:
+    """Return how a fault without a place is written with one; empty where that is not the slip."""
+    from elevon.parameters.records import wiring_names
+
+    kind, equals, severity = text.partition("=")
+    if not equals or "@" in kind:
+        return ""
+    known = [record for wiring in wiring_names() for record in catalogue(wiring)]
+    places = [name for record in known if record.kind == kind.strip() for name in record.places]
+    written = [f"{kind.strip()}@{place}={severity}" for place in dict.fromkeys(places)]
+    return f"; it needs a place: {' or '.join(map(repr, written))}" if written else ""
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,7 @@ class Fault:
         """
         match = _SPEC.fullmatch(text)
         if match is None or not match[3]:
-            raise InputError(f"fault {text!r} is not of the form {_FORM}")
+            raise InputError(f"fault {text!r} is not of the form {_FORM}{_placed(text)}")
         severity, _, attributes = match[3].partition(",")
         return cls(
             kind=match[1],

@@ -12,6 +12,7 @@ from elevon.errors import DivergedError, InputError, Interrupted
 from elevon.nexttest.belief import Belief
 from elevon.nexttest.information import expected_information, planned, profiles
 from elevon.plain import Plain, in_unit, key
+from elevon.report import ReportTable
 from elevon.results import Result
 
 if TYPE_CHECKING:
@@ -100,6 +101,27 @@ class NextTest(Result):
             f"Run {self.next.name} ({values}): {self.next.information:.2g} of the "
             f"{self.unknown:.2g} bit still unknown are expected from it."
         )
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the tests, the best first, and what is still possible."""
+        tests = [
+            (t.name, f"{t.information:.3f}", f"{t.duration:g}", f"{t.rate:.2g}",
+             "yes" if t.standard else "no")
+            for t in self.tests
+        ]  # fmt: skip
+        columns = ("test", "expected [bit]", "takes [s]", "[bit/min]", "healthy log at hand")
+        possible = [
+            (" and ".join(p.faults) or "healthy", f"{p.probability:.3f}")
+            for p in self.possible[:10]
+        ]
+        return [
+            ReportTable(columns, tests), ReportTable(("still possible", "probability"), possible)
+        ]  # fmt: skip
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the caller should know."""
+        return self.findings
 
 
 def next_test(

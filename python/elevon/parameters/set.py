@@ -16,6 +16,7 @@ from elevon.units import format_quantity
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
+    import pandas as pd
 
     from elevon.report.cards import Html
 
@@ -162,6 +163,14 @@ class ParameterSet(Mapping[str, Parameter]):
         """Read the mapping that `to_dict` returns; errors as the constructor."""
         entries = read_plain(dict[str, Parameter], data.get("entries"), place)
         return cls(str(data.get("wiring")), entries, place)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return one row a parameter, by path: value as written, unit, where it comes from."""
+        import pandas as pd
+
+        names = ("value", "unit", "confidence", "source", "note")
+        rows = [[getattr(item, name) for name in names] for item in self.values()]
+        return pd.DataFrame(rows, index=pd.Index(self, name="path"), columns=list(names))
 
     def value(self, path: str) -> float:
         """Return one number in SI; a choice as its index."""

@@ -12,7 +12,9 @@ import numpy as np
 from elevon.number_text import count_text
 from elevon.plain import STORED, WORKING, Plain, in_unit, key
 from elevon.prognose.future import Future
+from elevon.report import ReportTable
 from elevon.results import Result
+from elevon.units import to_display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -288,6 +290,27 @@ class Prognosis(Result):
         from elevon.prognose.page import sentence
 
         return sentence(self)
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the probability of surviving the next N, and what each requirement has left."""
+        from elevon.prognose.page import severity_unit
+
+        survived = [(f"{n:g}", f"{p:.3f}") for n, p in self.p_survive]
+        rows = []
+        for item in self.reserve:
+            unit = severity_unit(item.unit)
+            now, end = (f"{to_display(x, unit):.4g}" for x in (item.value, item.threshold))
+            rows.append((item.name, now, end, unit, f"{self.first[item.name]:.3f}"))
+        columns = ("requirement", "now", "life ends at", "unit", "fails first")
+        return [
+            ReportTable((f"next N {self.unit}", "probability of surviving"), survived),
+            ReportTable(columns, rows),
+        ]
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the caller should know."""
+        return self.findings
 
     def plot(self) -> Figure:
         """Return the probability of surviving over use."""

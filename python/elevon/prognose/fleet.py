@@ -13,6 +13,7 @@ from elevon.errors import InputError, RangeError
 from elevon.number_text import count_text
 from elevon.plain import STORED, WORKING, Plain, key
 from elevon.prognose.answer import Prognosis
+from elevon.report import ReportTable
 from elevon.results import Result
 
 if TYPE_CHECKING:
@@ -104,6 +105,15 @@ class FleetPlan(Result):
             f"{len(self.visits)} visit(s) for {len(self.units)} units: expected cost "
             f"{self.cost:.4g}, {self.cost_alone:.4g} with each unit alone."
         )
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the visits, unit by unit."""
+        return [ReportTable(self.HEADINGS, self.cells(), f"{self.unit} from now")]
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the caller should know."""
+        return self.findings
 
     @property
     def table(self) -> list[dict[str, Any]]:

@@ -27,6 +27,7 @@ from elevon.prognose.predict import LEVEL
 from elevon.prognose.process import Process
 from elevon.prognose.response import ResponseTables
 from elevon.progress import Progress
+from elevon.report import ReportTable
 from elevon.results import Result
 
 _KNOTS = 11  # of a form
@@ -166,6 +167,32 @@ class FleetGrowth(Result):
         if self.lives is not None:
             texts.append(f"lives: Weibull of shape {self.lives.shape:.3g}")
         return f"{self.count} units, {self.failed} failed; {'; '.join(texts)}."
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return what was learnt of each fault, and what the covariates do."""
+        rows = [
+            (key, str(item.units), f"{item.trust:.2f}", f"{item.life:.4g}", f"{item.spread:.2f}",
+             "{:.2f} to {:.2f}".format(*item.free.drift))
+            for key, item in self.growth.items()
+        ]  # fmt: skip
+        effects = [
+            (key, name, f"{effect:+.3g}")
+            for key, item in self.growth.items()
+            for name, effect in item.covariates.items()
+        ]
+        if self.lives is not None:
+            pairs = zip(self.lives.names[1:], self.lives.coefficients[1:], strict=True)
+            effects += [("lives", name, f"{value:+.3g}") for name, value in pairs]
+        columns = ("fault", "units", "follows the law", "median life", "spread", "drift")
+        tables = [ReportTable(columns, rows)]
+        if effects:
+            tables.append(ReportTable(("of", "covariate", "adds to the logarithm"), effects))
+        return tables
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the caller should know."""
+        return self.findings
 
     def tables(self, tables: ResponseTables) -> ResponseTables:
         """Return tables whose laws are as the fleet has them."""

@@ -17,6 +17,7 @@ from elevon.prognose.future import MODEL_ERROR, look_ahead
 from elevon.prognose.growth import GrowthFilter
 from elevon.prognose.mission import Usage
 from elevon.prognose.process import Process
+from elevon.report import ReportTable
 from elevon.results import Result
 
 if TYPE_CHECKING:
@@ -174,6 +175,21 @@ class NextInspection(Result):
             f"Inspect within {within} {self.unit}{how}: until then the unit fails with a "
             f"probability of at most {self.risk:.2g}."
         )
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the remaining life with one assumption after the other taken for certain."""
+        rows = [
+            (item.name, *("no end in sight" if use is None else count_text(use)
+                          for use in (item.median, item.low, item.high)))
+            for item in self.assumptions
+        ]  # fmt: skip
+        columns = ("assumed", "median", "low", "high")
+        return [ReportTable(columns, rows, f"remaining {self.unit}")]
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """What the caller should know."""
+        return self.findings
 
 
 def next_inspection(

@@ -151,6 +151,11 @@ class Recording(ChannelSet):
         return str(self.meta.get("status", "measured"))
 
     @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """Time of the samples [s], shape (n,); of several clocks one has to be named."""
+        return self.clock().time
+
+    @property
     def roles(self) -> dict[str, str]:
         """Role (``"motor_speed"``) to channel name; empty where nothing says what is what.
 

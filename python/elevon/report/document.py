@@ -47,6 +47,8 @@ class ReportTable:
     folded : str
         Heading under which a table stands closed until it is opened; empty: shown, but for one of
         over twenty rows, which folds under a heading of its own.
+    optional : sequence of str
+        Columns that a narrow terminal leaves out, the first one first.
     """
 
     columns: Sequence[str]
@@ -56,6 +58,7 @@ class ReportTable:
     marked: frozenset[int] = frozenset()
     formats: Sequence[str] = ()
     folded: str = ""
+    optional: Sequence[str] = ()
 
     @classmethod
     def of(

@@ -10,6 +10,7 @@ import numpy as np
 from elevon.arrays import Complex, Floats
 from elevon.errors import InputError
 from elevon.plain import Plain, in_unit, key
+from elevon.report import ReportTable
 from elevon.response.linear import BodeLines, LinearModel, zero_between
 
 if TYPE_CHECKING:
@@ -143,6 +144,26 @@ class FrequencyResponse(BodeLines):
             for text, value in (("gain -3 dB", self.bandwidth), ("phase -90 deg", self.lag_90))
         ]
         return f"{self.input} to {self.output} of {self.actuator}: {', '.join(reached)}."
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return gain, phase and coherence, frequency by frequency."""
+        data = self.to_dict()
+        columns = ("frequency [Hz]", "gain [dB]", "phase [deg]", "coherence", "gain +- [%]")
+        keys = ("frequency_hz", "gain_db", "phase_deg", "coherence")
+        numbers = zip(*(data[key] for key in keys), 100.0 * 1.645 * self.std, strict=True)
+        formats = ("{:.4g}", "{:.2f}", "{:.1f}", "{:.3f}", "{:.1f}")
+        rows = [[f.format(x) for f, x in zip(formats, row, strict=True)] for row in numbers]
+        return [ReportTable(columns, rows)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """The linear model, where one was asked for, and the band in which it holds."""
+        texts = []
+        if (model := self.linear) is not None:
+            poles = [f"{x.real:.4g}{f'{x.imag:+.4g}j' if x.imag else ''}" for x in model.poles]
+            texts.append(f"linear model: {model.order} states, error {model.error:.2g}")
+            texts.append(f"poles [1/s]: {', '.join(poles)}")
+        return texts if self.band is None else [*texts, self.band.text]
 
     @property
     def bandwidth(self) -> float | None:

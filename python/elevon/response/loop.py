@@ -19,6 +19,7 @@ from elevon.arrays import Complex, Floats
 from elevon.errors import InputError, unknown
 from elevon.plain import Plain, in_unit, key
 from elevon.progress import Progress
+from elevon.report import ReportTable
 from elevon.response.linear import BodeLines, zero_between
 from elevon.response.measure import Excitation, Multisine, frequencies
 from elevon.simulate import check_fidelity, solver_step
@@ -201,6 +202,11 @@ _SIZE = {"position": ("1 deg", "1 mm"), "speed": ("200 rpm",) * 2, "current": ("
 _SAMPLES = 20
 
 
+def _margin_text(margin: Margin) -> str:
+    unknown = "not known" if margin.interval else "not reached"
+    return unknown if margin.value is None else f"{margin.value:.4g}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class LoopResponse(BodeLines):
     """The open loop at each line.
@@ -245,6 +251,28 @@ class LoopResponse(BodeLines):
             for name, margin in _named(self.margins).items()
         ]
         return f"{self.loop} loop of {self.actuator}: {', '.join(parts)}."
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the margins with their intervals."""
+        margins, linear = self.margins, self.linear
+        head, rows = ["margin", "value", "low", "high", "unit", "at [Hz]"], []
+        for name, field, unit in (
+            ("crossover", "crossover", "Hz"),
+            ("phase margin", "phase", "deg"),
+            ("gain margin", "gain", "dB"),
+            ("disk margin", "disk", "1"),
+        ):
+            margin = getattr(margins, field)
+            ends = ["", ""] if margin.interval is None else [f"{x:.4g}" for x in margin.interval]
+            at = "" if margin.frequency is None else f"{margin.frequency:.3g}"
+            by_linear = [] if linear is None else [_margin_text(getattr(linear, field))]
+            rows.append([name, _margin_text(margin), *ends, unit, at, *by_linear])
+        return [ReportTable([*head, *([] if linear is None else ["linear loop"])], rows)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What to do where the amplitude of the feedback leaves doubts."""
+        return [self.hint] if self.hint else []
 
     @cached_property
     def margins(self) -> Margins:

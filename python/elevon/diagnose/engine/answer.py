@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
+from elevon.number_text import severity_texts
 from elevon.plain import WORKING, Plain, in_unit, key
+from elevon.report import ReportTable
 from elevon.results import Result
 
 if TYPE_CHECKING:
@@ -141,6 +144,13 @@ class Reason(Plain):
     limit: float
 
 
+def _severity_cells(cause: Cause) -> tuple[str, str, str]:
+    """Return a severity with its interval; a class may have none."""
+    if math.isnan(cause.severity):
+        return "-", "-", "-"
+    return severity_texts(cause.severity, cause.interval, cause.unit)
+
+
 @dataclass(frozen=True)
 class Diagnosis(Result):
     """The answer.
@@ -259,6 +269,26 @@ class Diagnosis(Result):
         from elevon.diagnose.engine.page import verdict
 
         return verdict(self)
+
+    def text_tables(self) -> list[ReportTable]:
+        """Return the causes, the most probable first."""
+        from elevon.diagnose.engine.page import folded
+
+        rows = [
+            (f"{c.kind}@{c.place}", f"{c.probability:.3f}", *_severity_cells(c),
+             ", ".join(folded(c)))
+            for c in self.faults
+        ]  # fmt: skip
+        columns = ("cause", "probability", "severity", "low", "high", "ambiguous with")
+        return [ReportTable(columns, rows)]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What the caller should know: findings, the answer in words, what cannot be seen."""
+        from elevon.diagnose.engine.page import by_reason, sentence
+
+        unseen = [f"not observable: {n}: {reason}" for n, reason in by_reason(self.unobservable)]
+        return [*self.findings, sentence(self), *unseen]
 
     def plot(self) -> Figure:
         """Return how far each feature deviates from a healthy unit."""
