@@ -9,10 +9,10 @@ def test_the_times_say_which_steps_were_resumed(tmp_path):
     story = Story(tmp_path, "a")
     story.begin()
     story.timed("one", lambda: None)
-    story.kept("two", "piece", float, lambda: 1.5)
+    story.resumable("two", "piece", float, lambda: 1.5)
     again = Story(tmp_path, "a")
     assert again.resumes
-    assert again.kept("two", "piece", float, lambda: 2.5) == 1.5
+    assert again.resumable("two", "piece", float, lambda: 2.5) == 1.5
     for used, kept in ((story, False), (again, True)):
         report = Report("t")
         times_section(report, used)

@@ -106,7 +106,7 @@ class Other(Plain):
 
 def made(story, page, x, kind=Kept, piece="life"):
     """Do the step, or take it; return its result and whether it was taken."""
-    result = story.kept("step", piece, kind, lambda: Kept(x), [page])
+    result = story.resumable("step", piece, kind, lambda: Kept(x), [page])
     return result.x, story.steps[-1].resumed
 
 

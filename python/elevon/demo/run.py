@@ -199,7 +199,7 @@ def run_life(
     story = Story(folder, f"{elevon.__version__} {seed} {base.hash} {hidden.hash}")
     demo = LifeDemo(seed, base, hidden, folder, story)
     _claim(demo, force=force)
-    demo.life = story.kept(
+    demo.life = story.resumable(
         "the unit flies until it fails (high-fidelity snapshots)", "life", Life,
         lambda: live(hidden, seed, part(progress, 0.0, 0.15)),
     )  # fmt: skip
@@ -256,7 +256,9 @@ def _calibrate(demo: LifeDemo, progress: Progress | None) -> None:
 
     demo.healthy = demo.story.timed("virtual bench: logs of the new unit", bench)
     name = "calibration on the first healthy logs"
-    demo.calibration = demo.story.kept(name, "calibration", Calibration, work, [*files, target])
+    demo.calibration = demo.story.resumable(
+        name, "calibration", Calibration, work, [*files, target]
+    )
 
 
 def _inspect(demo: LifeDemo, progress: Progress | None) -> None:
@@ -279,7 +281,7 @@ def _visit(demo: LifeDemo, usage: float) -> InspectionVisit:
     log = demo.story.timed(
         "virtual bench: a log at each inspection", lambda: _log(demo, name, usage, number)
     )
-    diagnosis = demo.story.kept(
+    diagnosis = demo.story.resumable(
         "diagnosis of each log", f"inspection-{number}", Diagnosis,
         lambda: elevon.diagnose(log, actuator, baselines=demo.healthy),
         [log, *demo.healthy, demo.folder / "calibrated.toml"],

@@ -86,7 +86,7 @@ class Story:
         self._note(name, begin, "")
         return result
 
-    def kept(
+    def resumable(
         self, name: str, piece: str, kind: type[Made], work: Callable[[], Made],
         files: Sequence[Path] = (),
     ) -> Made:  # fmt: skip
