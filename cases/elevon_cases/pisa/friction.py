@@ -472,11 +472,12 @@ def _history_figure(both: Sequence[FrictionTrace]) -> Figure:
     )
     with new_figure(4, 1, height=6.2, sharex=True) as (figure, panels):
         for axes, (name, label) in zip(panels, signals, strict=True):
-            width = {"lw": 0.8} if name == "friction_n" else {}
+            first = name == "friction_n"
             for trace, (way, colour, _) in zip(both, _WAYS, strict=True):
                 thin = slice(10, None, max(1, trace.time.size // 1500))
                 values = getattr(trace, name)[thin]
-                axes.plot(trace.time[thin], values, color=colour, label=way, **width)
+                about = {"lw": 0.8, "label": way} if first else {}
+                axes.plot(trace.time[thin], values, color=colour, **about)
             axes.set(ylabel=label)
         panels[0].legend(loc="center right")
         panels[-1].set(xlabel="Time [s]")
