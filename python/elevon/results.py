@@ -36,7 +36,7 @@ _KINDS = {
     "loop-response": "elevon.response.loop:LoopResponse",
     "monitoring": "elevon.diagnose.monitor.answer:Monitoring",
     "next-inspection": "elevon.prognose.next_inspection:NextInspection",
-    "next-test": "elevon.nexttest.choose:NextTest",
+    "next-test": "elevon.nexttest.door:NextTest",
     "prognosis": "elevon.prognose.answer:Prognosis",
     "response": "elevon.response.estimate:FrequencyResponse",
     "validation": "elevon.calibrate.validation:Validation",

@@ -41,6 +41,9 @@ struct bench {
     double encoder_counts;     /* an output turn */
     double encoder_gain;
     double encoder_offset;     /* rad */
+    double encoder_error;      /* rad at the output, once a turn of the encoder's wheel */
+    double encoder_turns;      /* of that wheel an output turn */
+    double encoder_phase;      /* rad: where the wheel stands when the drive is switched on */
     double encoder_delay;      /* s, of the logged value */
     double quantised_loop;     /* 1: the position loop sees counts */
     double motor_counts;       /* a motor turn */
@@ -67,6 +70,13 @@ static const double TURN = 6.283185307179586;
 static double clip(double x, double limit)
 {
     return x > limit ? limit : x < -limit ? -limit : x;
+}
+
+/* What the encoder shows of an output angle. */
+static double read_by(const struct bench *b, double output)
+{
+    return b->encoder_gain * output + b->encoder_offset
+         + b->encoder_error * sin(b->encoder_turns * output + b->encoder_phase);
 }
 
 static double counted(double angle, double counts)
@@ -126,7 +136,7 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
         const double b_now = brake[n / outer];
         past[n % (late + 1)] = output;
         if (n % outer == 0) {
-            double seen = b->encoder_gain * output + b->encoder_offset;
+            double seen = read_by(b, output);
             if (b->quantised_loop)
                 seen = counted(seen, b->encoder_counts);
             w_ref = clip(b->position_gain * (command[n / outer] - seen), b->speed_limit);
@@ -168,7 +178,7 @@ int run(const struct bench *b, const double *command, const double *brake, doubl
                                     : slide(&w, active, stick, moving + b_now, b->inertia, dt);
         if (n % log == 0) {
             double *row = rows + n / log * COLUMNS;
-            double seen = b->encoder_gain * past[(n + 1) % (late + 1)] + b->encoder_offset;
+            double seen = read_by(b, past[(n + 1) % (late + 1)]);
             row[OUTPUT] = counted(seen, b->encoder_counts);
             row[MOTOR] = motor;
             row[SPEED_REF] = w_ref;

@@ -80,6 +80,9 @@ class Sensors:
 
     encoder_gain: float = 1.0
     encoder_offset: float = 0.02
+    encoder_error: float = 0.0
+    encoder_turns: float = 1.0
+    encoder_phase: float = 0.0
     encoder_delay: float = 0.0
     motor_zero: float = 3.0
     motor_rounding: float = 0.0  # deg in the file; 0: none

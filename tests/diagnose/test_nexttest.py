@@ -179,10 +179,10 @@ def test_what_is_counted_is_drawn_as_a_count():
 
 
 def test_a_test_of_a_screw_tells_backlash_from_friction(monkeypatch):
-    from elevon.nexttest import choose
+    from elevon.nexttest import door
 
     unit = Actuator.load("nasa-ballscrew")
-    monkeypatch.setattr(choose, "profiles", lambda a: profiles(a)[:1])  # a second each
+    monkeypatch.setattr(door, "profiles", lambda a: profiles(a)[:1])  # a second each
     answer = elevon.next_test(unit, [_linear_result()])
     assert answer.next.name == "sine-free"
     assert 0.3 * answer.unknown < answer.next.information < answer.unknown + 0.1
@@ -205,9 +205,9 @@ def test_a_diagnosis_without_hypotheses_is_no_result():
 
 
 def test_the_command_line(elevon_cli, monkeypatch, tmp_path):  # noqa: F811
-    from elevon.nexttest import choose
+    from elevon.nexttest import door
 
-    monkeypatch.setattr(choose, "profiles", lambda a: profiles(a)[::2][:2])  # fewer: seconds each
+    monkeypatch.setattr(door, "profiles", lambda a: profiles(a)[::2][:2])  # fewer: seconds each
     path = tmp_path / "r.json"
     path.write_text(json.dumps(RESULT))
     result = elevon_cli("next-test", "--actuator", "torino-rotary", "--so-far", path, "--json")
