@@ -1,8 +1,9 @@
 """Units, days and causes on a bench of another program (`tests/calibrate/foreign.c`).
 
 It has another friction law, a sampled speed controller, a current loop with a lag, backlash that is
-elastic or drags, wheels with errors that are drawn anew in each run, windings that warm up, delays,
-counts, and files of its own. What a day changes is stated here, apart from `engine.days`.
+elastic or drags, wheels with errors that are drawn anew in each run, an encoder whose error has a
+new phase each time the drive is switched on, windings that warm up, delays, counts, and files of
+its own. What a day changes is stated here, apart from `engine.days`.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ _WHEEL, _PINION = math.radians(0.01), math.radians(0.002)  # largest errors at t
 #: Deviations from day to day, ASSUMED before any log was diagnosed: 12 K of winding, 8 K of
 #: magnets (-0.1 %/K), friction by 5 %, grease by 10 %, current sensors by 0.3 % and 20 mA.
 _WINDING, _MAGNETS, _DRY, _VISCOUS, _GAIN, _OFFSET = 12.0 * 0.0039, 8e-3, 0.05, 0.10, 0.003, 0.02
+#: Largest error of the encoder once a turn of its wheel, rad at the output, and turns of the wheel.
+_ENCODER, _ENCODER_TURNS = 2e-4, 4.0
 AND = " and "
 _WARMING = 1e-3  # largest growth of the resistance in a second
 
@@ -88,8 +91,14 @@ def of_day(unit: Unit, rng: Rng) -> tuple[Bench, Sensors]:
         pinion_phase=float(rng.uniform(0.0, 2.0 * math.pi)),
         warming=float(rng.uniform(0.0, _WARMING)),
     )
-    offset = s.current_offset + _OFFSET * n[5]
-    return bench, replace(s, current_offset=offset)
+    sensors = replace(
+        s,
+        current_offset=s.current_offset + _OFFSET * n[5],
+        encoder_error=float(rng.uniform(0.5, 1.0)) * _ENCODER,
+        encoder_turns=_ENCODER_TURNS,
+        encoder_phase=float(rng.uniform(0.0, 2.0 * math.pi)),
+    )
+    return bench, sensors
 
 
 def changed(bench: Bench, sensors: Sensors, cause: Cause) -> tuple[Bench, Sensors]:

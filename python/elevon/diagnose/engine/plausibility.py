@@ -16,7 +16,7 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.posterior import Posterior
 from elevon.diagnose.engine.reading import Reading
 from elevon.diagnose.engine.spread import DEGREES
-from elevon.diagnose.engine.table import deviations
+from elevon.diagnose.engine.table import deviations, periodic_covariance
 
 SHARE = 0.2  # of the false alarms: what no candidate moves. ASSUMED
 _PERIODS = 0.01  # relative difference of two logs' sampling up to which noise compares
@@ -76,6 +76,7 @@ def plausibility(item: Reading, baselines: Sequence[Reading]) -> Plausibility:
     rows = np.array([s.only(names).values for s in seen]).reshape(len(near), len(names))
     mean, count = rows.mean(axis=0), len(near)
     variance = deviations(records, mean, "repeats") ** 2
+    variance = variance + np.diag(periodic_covariance(item.periodic()[1], names))
     # The stated spread counts as so many runs, beside what the baselines scatter.
     scatter = np.sum((rows - mean) ** 2, axis=0) / variance
     scale = np.maximum((DEGREES + scatter) / (DEGREES + count - 1), 1.0)

@@ -141,6 +141,13 @@ class Reading(ABC):
         """Return how far what looks like a candidate, ``KIND@PLACE``, moves plausible features."""
         return {}
 
+    def periodic(self) -> tuple[list[FeatureVector], list[FeatureVector]]:
+        """Return how far errors of a sensor that are new at each power-up move what the log shows.
+
+        Of each a vector that stands for one deviation: of features, and of what is plausible.
+        """
+        return [], []
+
     @abstractmethod
     def digest(self) -> bytes:
         """Of all that its model runs depend on."""

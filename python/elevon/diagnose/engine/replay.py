@@ -11,7 +11,13 @@ from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import SEEN
 from elevon.diagnose.engine.candidates import CandidateFault
 from elevon.diagnose.engine.reading import Reading, ReplayUnit
-from elevon.diagnose.engine.table import Feature, FeatureTable, FeatureVector, deviations
+from elevon.diagnose.engine.table import (
+    Feature,
+    FeatureTable,
+    FeatureVector,
+    deviations,
+    periodic_covariance,
+)
 from elevon.experiment import Variant
 
 _MOST = 1e4  # least deviations that a fault moves a number by: beyond it nothing more is learnt
@@ -174,6 +180,8 @@ def _replayed(item: Reading, candidates: Sequence[CandidateFault]) -> Replay:
             severities[c.key] = np.array([0.0, np.nextafter(_ACTS, 0.0), _ACTS, 1.0])
             shifts[c.key] = shifts[c.key][[0, 0, 1, 1]]
     mean, spread = _healthy_days(draws, None if days is None else days.steps, healthy.values)
+    if days is not None:
+        spread = spread + periodic_covariance(item.periodic()[0], healthy.names)
     made = Replay(
         healthy, severities, shifts, table, mean, spread, item.DEGREES, uncertainties,
         rows[0] - rows[1] if doubts else 0.0, item.ALIKE, item.PRIOR, len(outcomes),

@@ -89,3 +89,10 @@ class FeatureVector:
         """Return some of it, in the order given."""
         at = [self.names.index(name) for name in names]
         return FeatureVector(tuple(names), self.values[at], self.std[at], self.floats)
+
+
+def periodic_covariance(moves: Sequence[FeatureVector], names: Sequence[str]) -> Floats:
+    """Return the covariance of features, shape (k, k), that independent moves give them."""
+    rows = [v.only(names).values for v in moves if all(n in v.names for n in names)]
+    moved = np.array(rows).reshape(-1, len(names))
+    return np.asarray(moved.T @ moved, dtype=np.float64)

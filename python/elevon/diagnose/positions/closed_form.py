@@ -20,7 +20,7 @@ import numpy as np
 
 from elevon.arrays import Floats
 from elevon.diagnose.engine.answer import Cause, FaultPlace
-from elevon.diagnose.positions.features import carried, regress
+from elevon.diagnose.positions.features import ENCODER_ERROR, carried, regress
 from elevon.diagnose.signs import EVERYTHING, Sign, sign_of
 from elevon.logs.log import bridged
 
@@ -317,12 +317,15 @@ def _lost_counts(item: DriveLog, healthy: Sequence[DriveLog]) -> Sign | None:
     ratio = item.value("gear.ratio")
     usual = [float(_gap(other)[0][1]) for other in healthy if other.moving.sum() >= _LEAST]
     more = (float(weights[1]) - (float(np.mean(usual)) if usual else 0.0)) / ratio
-    error = float(deviations[1]) / ratio
+    noise = float(deviations[1]) / ratio
+    # An error once a turn of the encoder's wheel is a slope over a part of it, anew each day.
+    turns = item.value("sensor.encoder.wheel_ratio")
+    error = math.hypot(noise, ENCODER_ERROR * turns / math.sqrt(3.0))
     if not max(LOST, _DEVIATIONS * error) < more < _OTHER:
         return None
     ends = _ends(more, error)
     kinds = [("missing_counts", "sensor.encoder"), ("gain", "sensor.resolver")]
-    if error > _STEPS * more:  # what is lost in one place leaves steps, no straight line
+    if noise > _STEPS * more:  # what is lost in one place leaves steps, no straight line
         kinds = [("dark_sectors", "sensor.encoder"), kinds[0]]
     cause = _sized(kinds, [x / (1.0 + x) for x in ends])
     return sign_of(cause, more, LOST, moves=_OF_COUNTS, text=_CLOSED, error=error)

@@ -151,6 +151,10 @@ _SHORT = 256
 #: of a log do not show it. ASSUMED: from units of another program whose speed is steady.
 _IN_STEP = 0.1
 LEAST = 100  # samples of a regression
+#: rad at the output: largest amplitude of an encoder's error once a turn of its wheel; any up to it
+#: is as likely. Where the wheel stands when the drive is switched on nobody knows, so the phase is
+#: free. ASSUMED: the class of 40 arcseconds.
+ENCODER_ERROR = 2e-4
 SLOW = 0.1  # of the highest speed
 SMOOTH = 0.02  # s of the difference that gives the acceleration
 _BRAKE = 8  # place of the brake torque among the columns that explain the current

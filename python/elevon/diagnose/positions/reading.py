@@ -16,7 +16,7 @@ from elevon.diagnose.engine.candidates import of_a_magnet
 from elevon.diagnose.engine.days import DAILY, moved_value
 from elevon.diagnose.engine.reading import Days, Reading, ReplayUnit, SignalPanel
 from elevon.diagnose.engine.table import FeatureTable, FeatureVector
-from elevon.diagnose.positions.features import FEATURES, features_of
+from elevon.diagnose.positions.features import ENCODER_ERROR, FEATURES, features_of
 from elevon.diagnose.positions.log import LONGEST, RUN_IN, prepared
 from elevon.diagnose.positions.plausibility import PLAUSIBLE, plausibility_of
 from elevon.experiment import Experiment, Inputs, Variant
@@ -122,6 +122,27 @@ class PositionReading(Reading):
     def plausible_table(self) -> FeatureTable:
         """Records of that."""
         return PLAUSIBLE
+
+    @cached_property
+    def _moved_by_encoder(self) -> tuple[list[FeatureVector], list[FeatureVector]]:
+        turn = self.actuator.parameters.value("sensor.encoder.wheel_ratio") * self.log.output
+        features: list[FeatureVector] = []
+        plausible: list[FeatureVector] = []
+        bare = self.log.without("command")
+        for wave in (np.cos(turn), np.sin(turn)):
+            error = ENCODER_ERROR / math.sqrt(6.0) * wave  # of a size up to that, and any phase
+            other = bare.with_channels(output_position=bare.output + error)
+            features.append(_less(logged_features(other, self.actuator, deviations=False),
+                                  self.features))  # fmt: skip
+            plausible.append(_less(plausibility_of(other, self.actuator), self.plausible))
+        return features, plausible
+
+    def periodic(self) -> tuple[list[FeatureVector], list[FeatureVector]]:
+        """Return what the encoder's error once a turn of its wheel moves, its phase being free.
+
+        The wheel stands somewhere else each time the drive is switched on.
+        """
+        return self._moved_by_encoder
 
     @property
     def table(self) -> FeatureTable:
@@ -293,6 +314,13 @@ class PositionReading(Reading):
                 "own; the backlash is read from the width of the two positions' difference"
             )
         return [f"{log.name}: {text}" for text in out]
+
+
+def _less(one: FeatureVector, other: FeatureVector) -> FeatureVector:
+    """Return the difference of the features that both have."""
+    names = tuple(name for name in one.names if name in other.names)
+    off = one.only(names).values - other.only(names).values
+    return FeatureVector(names, off, np.zeros(len(names)))
 
 
 def _near(a: float, b: float, share: float) -> bool:
