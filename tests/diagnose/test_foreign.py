@@ -24,9 +24,9 @@ def test_the_foreign_encoder_errs_once_a_turn_of_its_wheel():
     done = run(bench, off, NOLOAD, seed=1, duration=3.0)
     assert np.abs(done.rows["output"] - plain.rows["output"]).max() < 4e-4
     true = (done.rows["motor"] - plain.rows["motor"]) / bench.ratio
-    shown = done.rows["output"] - plain.rows["output"] - true
+    seen = done.rows["output"] - plain.rows["output"] - true
     expected = 2e-4 * np.sin(4.0 * plain.rows["output"] + 0.7)
-    assert np.std(shown - expected) < 0.5 * np.std(expected) + 1e-4
+    assert np.std(seen - expected) < 0.5 * np.std(expected) + 1e-4
 
 
 def test_what_an_encoders_free_phase_moves_is_spread_of_a_healthy_unit():
