@@ -17,7 +17,7 @@ import pytest
 import elevon
 from elevon import Actuator
 from elevon.bench.hidden import RECOVERED
-from elevon.calibrate.outcome import Calibration, by_path
+from elevon.calibrate.outcome import Calibration
 from elevon.calibrate.validation import SignalError, Validation, ValidationTrace
 from elevon.demo.story import Story
 from elevon.estimate import Estimate
@@ -42,7 +42,7 @@ def found(base):
         for path in paths
     )
     return Calibration(
-        actuator=fitted, before=base, logs=(), parameters=by_path(estimates),
+        actuator=fitted, before=base, logs=(), parameters={item.path: item for item in estimates},
         findings=("what it says",),
     )  # fmt: skip
 

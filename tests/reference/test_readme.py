@@ -137,30 +137,57 @@ def test_a_worn_day_is_named_and_its_answer_read_back(tmp_path):
 _READ_BACK = """
 for number, result in enumerate((fitted, *(answer for _, answer in history))):
     assert elevon.load(result.save(f"{number}.json")) == result
-print(*(answer.status for _, answer in history), *answer.best)
+print(*(answer.status for _, answer in history), *history[-1][1].best)
 """
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("unit", BENCHES)
-def test_from_logs_to_an_answer(unit, tmp_path):
-    """The ten lines as they stand, and with what each other actuator's bench is called."""
+def _ten_lines(unit, folder):
+    """Run the ten lines, with what the bench of a unit is called; return what they print."""
     _, code = _blocks("README.md", "python")
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
-    (procedure, fault), (chirp, backlash) = BENCHES[unit], BENCHES["torino-rotary"]
-    for old, new in (("torino-rotary", unit), (f'"{chirp}"', f'"{procedure}"'), (backlash, fault)):
+    (procedure, fault), (chirp, _) = BENCHES[unit], BENCHES["torino-rotary"]
+    for old, new in (("torino-rotary", unit), (f'"{chirp}"', f'"{procedure}"')):
         code = code.replace(old, new)
-    if unit != "torino-rotary":  # the mission is the rotary unit's
+    if unit != "torino-rotary":  # wear and mission are the rotary unit's
+        assert code.count('f"backlash@transmission={wear} deg"') == 1
+        code = code.replace('f"backlash@transmission={wear} deg"', repr(fault))
         code = "\n".join(line for line in code.splitlines() if "elevon.predict" not in line)
-    code += _READ_BACK
-    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copytree(ROOT / "examples", folder / "examples")
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+        [sys.executable, "-c", code + _READ_BACK],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    last = done.stdout.splitlines()[-1].split()
-    assert last[:2] == ["healthy", "faulty"], done.stdout
-    assert fault.partition("=")[0] in last[2:], done.stdout
+    return done.stdout.splitlines()
+
+
+def _numbers(line):
+    return [float(text.replace(",", "")) for text in re.findall(r"\d[\d,]*\.?\d*", line)]
+
+
+def test_the_answers_printed_in_readme_are_those_of_its_lines(tmp_path):
+    """Words alike; what is estimated lies within the printed interval."""
+    fault, life, statuses = _ten_lines("torino-rotary", tmp_path)
+    printed = _blocks("README.md", "text")[1].splitlines()
+    assert len(printed) == 2
+    for line, expected in zip((fault, life), printed, strict=True):
+        assert re.sub(r"[\d,.]+", "#", line) == re.sub(r"[\d,.]+", "#", expected)
+    size, low, high, _ = _numbers(printed[0])
+    assert low <= _numbers(fault)[0] <= high
+    assert _numbers(fault)[0] == pytest.approx(size, abs=0.5 * (high - low))
+    _, median, _, low, high, _ = _numbers(printed[1])
+    assert low <= _numbers(life)[1] <= high
+    assert _numbers(life)[1] == pytest.approx(median, rel=0.1)
+    assert statuses.split() == ["faulty"] * 3 + ["backlash@transmission"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("unit", list(BENCHES)[1:])
+def test_from_logs_to_an_answer(unit, tmp_path):
+    """The ten lines with what each other actuator's bench is called."""
+    last = _ten_lines(unit, tmp_path)[-1].split()
+    assert last[:3] == ["faulty"] * 3
+    assert BENCHES[unit][1].partition("=")[0] in last[3:]
 
 
 @pytest.mark.parametrize(
