@@ -7,7 +7,7 @@ import pytest
 
 import elevon
 from elevon import Actuator
-from elevon.diagnose.by_model import Request, diagnose
+from elevon.diagnose.by_model import DiagnosisRequest, diagnose
 from elevon.diagnose.engine.candidates import CANDIDATES, chosen
 from elevon.diagnose.engine.case import Detector, JoinedLogs, case_of
 from elevon.diagnose.engine.posterior import marginals, posterior, quantiles
@@ -230,7 +230,7 @@ def test_the_model_with_what_is_named_shows_what_the_log_shows(unit, logs):
     items = read_logs([logs["backlash"]])
     base = read_logs([logs["base"]])
     result = diagnose(items, unit, baselines=base, faults=FEW)
-    traces, healthy = Request(items, base, unit).traces(result)
+    traces, healthy = DiagnosisRequest(items, base, unit).traces(result)
     assert (traces.baseline, healthy.baseline, healthy.name) == (False, True, base[0].name)
     assert healthy.panels[0].named is None
     assert healthy.panels[0].apart < 0.3 * traces.panels[0].apart

@@ -87,7 +87,8 @@ def test_a_network_address_asks_for_its_token(token, refused):
     reason = guard.refuses({"host": "bench.example:8484"}, token)
     assert (reason is not None) == refused
     other = guard.refuses({"host": "bench.example:8484", "origin": "http://evil.example"}, "secret")
-    assert "origin" in other
+    assert other[0] == 403
+    assert "origin" in other[1]
 
 
 def test_a_calibrated_file_is_what_diagnosis_holds_for_healthy(tmp_path):

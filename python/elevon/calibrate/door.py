@@ -88,7 +88,9 @@ def calibrate(
     table = logs[0] if isinstance(logs, (list, tuple)) and len(logs) == 1 else logs
     if isinstance(table, (str, os.PathLike)) and is_drop_table(Path(table)):
         return run_drops(Path(table), model)
-    request = Request(model, free, per_log, fidelity, transient, promise, torque_constant, progress)
+    request = CalibrationRequest(
+        model, free, per_log, fidelity, transient, promise, torque_constant, progress
+    )
     return _refused(calibrate_any(as_logs(logs), request))
 
 
@@ -139,7 +141,8 @@ def validate(
     """
     model = as_actuator(actuator)
     return validate_any(
-        as_logs(logs), Request(model, fidelity=fidelity, transient=transient, progress=progress)
+        as_logs(logs),
+        CalibrationRequest(model, fidelity=fidelity, transient=transient, progress=progress),
     )
 
 
@@ -197,7 +200,7 @@ _FROM_THE_FIT = "thresholds: from the fit itself, since no log could be held out
 
 
 @dataclass(frozen=True)
-class Request:
+class CalibrationRequest:
     """What is to be estimated, or held against logs; see `calibrate` and `validate`."""
 
     actuator: Actuator
@@ -210,7 +213,7 @@ class Request:
     progress: Progress | None = None
 
 
-def calibrate_any(logs: Sequence[Log], request: Request) -> Calibration:
+def calibrate_any(logs: Sequence[Log], request: CalibrationRequest) -> Calibration:
     """Estimate what logs determine: subsystem by subsystem, in closed loop where that is needed.
 
     Raises
@@ -267,7 +270,7 @@ def _explained(result: Calibration) -> float:
     return 1.0 - sum(shares) / len(shares) if shares else 1.0
 
 
-def _check_machine(request: Request) -> None:
+def _check_machine(request: CalibrationRequest) -> None:
     """Refuse what regressions of subsystems have no meaning for."""
     if request.fidelity is not None:
         raise InputError(
@@ -296,7 +299,7 @@ def _way(
     return way, None
 
 
-def validate_any(logs: Sequence[Log], request: Request) -> Validation:
+def validate_any(logs: Sequence[Log], request: CalibrationRequest) -> Validation:
     """Hold an actuator against logs, each subsystem driven by its measured input where it can be.
 
     Raises
@@ -384,7 +387,7 @@ class _Signals:
 
     logs: Sequence[Log]
 
-    def calibrate(self, request: Request) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.calibration import calibrate as calibrate_drive
 
         result = calibrate_drive(
@@ -408,7 +411,7 @@ class _Signals:
             return _with(result, f"the closed loop is not compared: {error}")
         return replace(result, validation_before=before, validation=after)
 
-    def _held_out(self, result: Calibration, request: Request) -> Calibration:
+    def _held_out(self, result: Calibration, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.write import outliers
 
         after = result.validation
@@ -421,7 +424,7 @@ class _Signals:
         texts = [f"{name}: {apart}" for name in outliers(agreement)]
         return _with(replace(result, promise=agreement), *texts)
 
-    def validate(self, request: Request) -> Validation:
+    def validate(self, request: CalibrationRequest) -> Validation:
         return validate_drive(
             self.logs, request.actuator, fidelity=request.fidelity or "low",
             transient=request.transient, progress=request.progress,
@@ -441,7 +444,7 @@ class _ClosedLoop:
 
         return [loop_log(log) for log in self.given]
 
-    def calibrate(self, request: Request) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.stages.closed_loop import calibrate_loop
         from elevon.calibrate.stages.closed_loop.result import validate_loop
 
@@ -457,13 +460,13 @@ class _ClosedLoop:
         after = validate_loop(self.logs, result.actuator, request.transient, offsets)
         return _with(replace(result, validation=after), *filter(None, [self.why]))
 
-    def validate(self, request: Request) -> Validation:
+    def validate(self, request: CalibrationRequest) -> Validation:
         from elevon.calibrate.stages.closed_loop.result import validate_loop
 
         return validate_loop(self.logs, request.actuator, request.transient)
 
 
-def _check_loop(request: Request) -> None:
+def _check_loop(request: CalibrationRequest) -> None:
     """Refuse what the closed loop has no meaning for."""
     from elevon.simulate.prepare import check_fidelity
 
@@ -488,7 +491,7 @@ class _Balances:
     given: Sequence[Log]
     unit: bool
 
-    def calibrate(self, request: Request) -> Calibration:
+    def calibrate(self, request: CalibrationRequest) -> Calibration:
         from elevon.calibrate.stages import calibrate_parts
 
         result = calibrate_parts(
@@ -501,7 +504,7 @@ class _Balances:
             result = _with(result, text)
         return self._held_out(result, request) if request.promise else result
 
-    def _fidelity(self, request: Request) -> str:
+    def _fidelity(self, request: CalibrationRequest) -> str:
         return (request.fidelity or "auto") if self.unit else "auto"
 
     @staticmethod
@@ -520,7 +523,7 @@ class _Balances:
             if (moves_of(log) if self.unit else log.has("command") and log.duration < _LONG)
         ]
 
-    def _held_out(self, result: Calibration, request: Request) -> Calibration:
+    def _held_out(self, result: Calibration, request: CalibrationRequest) -> Calibration:
         """Thresholds of the actuator file, from motions held out where there are several.
 
         A single motion, or one without which too little is determined, is held against the values
@@ -536,7 +539,7 @@ class _Balances:
                 apart = model is not None
                 way = replace(self, given=[log for log in self.given if log.name == name])
                 fitted = result.actuator if model is None else model
-                judged.append(way.validate(Request(fitted)))
+                judged.append(way.validate(CalibrationRequest(fitted)))
         except ElevonError as error:
             return _with(result, f"no thresholds: {error}")
         errors = tuple(row for item in judged for row in item.errors)
@@ -544,7 +547,7 @@ class _Balances:
         promise = replace(judged[0], errors=errors, traces=(), commands=how)
         return _with(replace(result, promise=promise), *([] if apart else [_FROM_THE_FIT]))
 
-    def _without(self, name: str, request: Request) -> Actuator | None:
+    def _without(self, name: str, request: CalibrationRequest) -> Actuator | None:
         """Return the actuator calibrated from all other logs; None: they determine too little."""
         from elevon.calibrate.stages import calibrate_parts
 
@@ -556,7 +559,7 @@ class _Balances:
         except InputError:
             return None
 
-    def validate(self, request: Request) -> Validation:
+    def validate(self, request: CalibrationRequest) -> Validation:
         from elevon.calibrate.validation import validate_replay
 
         if not self.unit:

@@ -188,7 +188,7 @@ def diagnose(
     """
     begin = clock.perf_counter()
     check_request(logs, false_alarm)
-    request = Request(logs, baselines, actuator, faults, false_alarm, spread, unit_known)
+    request = DiagnosisRequest(logs, baselines, actuator, faults, false_alarm, spread, unit_known)
     answer = request.answer()
     if not request.seen_healthy:
         answer = _undecided(answer)
@@ -196,7 +196,7 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class Request:
+class DiagnosisRequest:
     """What a diagnosis by the model is asked for; attributes as the parameters of `diagnose`."""
 
     logs: Sequence[Log]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
-from elevon.diagnose.by_model import Request
+from elevon.diagnose.by_model import DiagnosisRequest
 from elevon.diagnose.by_model import diagnose as diagnose_by_model
 from elevon.diagnose.engine.answer import Diagnosis
 from elevon.diagnose.learning.answer import diagnose_by_classes, diagnose_by_spread_and_classes
@@ -93,7 +93,7 @@ def _signed(
     return replace(
         result, actuator=unit.name, parameter_hash=unit.hash, made_by=__version__,
         baselines=tuple(log.name for log in baselines),
-        request=Request(logs, baselines, unit) if result.method == "model" else None,
+        request=DiagnosisRequest(logs, baselines, unit) if result.method == "model" else None,
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from elevon.results import Result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from elevon.diagnose.by_model import Request
+    from elevon.diagnose.by_model import DiagnosisRequest
     from elevon.report import Report
 
 SEEN = 3.0  # deviations that a fault's shift must reach to be observable
@@ -215,7 +215,7 @@ class Diagnosis(Result):
     prior : mapping of str to float
         Of classes that were learnt: the share of the learnt logs that have each, by
         ``KIND@PLACE``.
-    request : Request or None
+    request : DiagnosisRequest or None
         Logs and actuator of an answer by the model: its page draws the signals by them.
     """
 
@@ -245,7 +245,9 @@ class Diagnosis(Result):
     made_by: str = ""
     method: str = "model"
     prior: Mapping[str, float] = field(default_factory=dict)
-    request: Annotated[Request | None, WORKING] = field(default=None, compare=False, repr=False)
+    request: Annotated[DiagnosisRequest | None, WORKING] = field(
+        default=None, compare=False, repr=False
+    )
 
     KIND: ClassVar = "diagnosis"
     TABLE: ClassVar = "faults"
