@@ -5,8 +5,7 @@
 //!     s = 1 / sqrt(1 + (i_q^2 + xi (i_d + i_0)^2) / I_s^2)
 //!     psi_q = L s i_q,   psi_d = k / p + xi L (s (i_d + i_0) - s_0 i_0),   s_0 = s at no current
 //!
-//! Torque 3/2 p (psi_d i_q - psi_q i_d), stored energy 3/2 int i dpsi. Tables of a machine are fitted by these four numbers
-//! (`elevon.parameters.flux_map`); with xi = 1 and I_s = 0 the linkages are L i and none of this code runs.
+//! Torque 3/2 p (psi_d i_q - psi_q i_d), stored energy 3/2 int i dpsi. With xi = 1 and I_s = 0 the linkages are L i and none of this code runs.
 
 use crate::motor::star::MotorParameter;
 use crate::scalar::{three_phase, Scalar};
