@@ -1,9 +1,9 @@
 """Transients of aircraft supplies by the clauses of their standards, as tables of volts over time.
 
 A table runs along the limit that its clause draws, from the nominal voltage and back to it. Edges
-that a standard leaves open take `EDGE`. All levels and instants are ASSUMED: they have not been held
-against the text of the standards, but for the levels of DO-160G 16.6.1.4, which a vendor's manual
-states too (with sags of 15 and 12 ms where 30 ms stand here).
+that a standard leaves open take `EDGE`. All levels and instants are ASSUMED: they have not been
+held against the text of the standards, but for the levels of DO-160G 16.6.1.4, which a vendor's
+manual states too (with sags of 15 and 12 ms where 30 ms stand here).
 """
 
 from __future__ import annotations
