@@ -94,5 +94,5 @@ class FeatureVector:
 def periodic_covariance(moves: Sequence[FeatureVector], names: Sequence[str]) -> Floats:
     """Return the covariance of features, shape (k, k), that independent moves give them."""
     rows = [v.only(names).values for v in moves if all(n in v.names for n in names)]
-    moved = np.array(rows).reshape(-1, len(names))
+    moved = np.array(rows).reshape(len(rows), len(names))
     return np.asarray(moved.T @ moved, dtype=np.float64)
