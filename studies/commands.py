@@ -98,7 +98,6 @@ def _save_independent(
     table : path
         Markdown file for the limits of all tests.
     """
-    from elevon.files import write_text
     from studies.independent.table import independent_table
 
     if table is not None:
@@ -107,8 +106,7 @@ def _save_independent(
             f"--seed {seed}"
         )
         text = independent_table(result, f"python -m studies independent {numbers}")
-        write_text(table, text, force=force)
-        say(f"table: {table}")
+        _write_page(table, text, force=force)
 
 
 def _save_table(
@@ -129,14 +127,19 @@ def _save_table(
     table : path
         Markdown file for the limits of all tests.
     """
-    from elevon.files import write_text
     from studies.fault_limits.table import limits_table
 
     if table is not None:
         options = {"days": days, "injected": injected, "fidelity": fidelity, "seed": seed}
         text = limits_table(result, _again(options | {"actuator": actuator}))
-        write_text(table, text, force=force)
-        say(f"table: {table}")
+        _write_page(table, text, force=force)
+
+
+def _write_page(path: Path, text: str, *, force: bool) -> None:
+    from elevon.files import write_text
+
+    write_text(path, text, force=force)
+    say(f"table: {path}")
 
 
 def _again(options: Options) -> str:
