@@ -49,7 +49,7 @@ _FILES = (
     "report.html", "prognosis.html", "diagnosis.html", "calibrated.toml", "mission.toml",
     "truth.json", "cone.svg", "mechanism.svg",
 )  # fmt: skip
-_UNIT = "torino-rotary SN 0042"
+_UNIT = "SN 0042"
 _TEST = "backlash"
 _TRACES = ("sine", "chirp", "loaded")
 
